@@ -1,0 +1,77 @@
+"""Forward and inverse kinematics of the UR5, in the controller's base frame.
+
+Modified Denavit-Hartenberg (thesis eq 3.3, table 3.1); all inverse branches from `ur-analytic-ik`.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.errors import UnreachableError
+from weldsim.frames import Transform
+from weldsim.mounts import X_FT
+
+JOINT_NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+A2, A3, D1, D4, D5, D6 = -0.425, -0.39225, 0.089159, 0.10915, 0.09465, 0.0823
+ALPHA = np.array([0.0, np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2])  # alpha_{i-1} [rad]
+A = np.array([0.0, 0.0, A2, A3, 0.0, 0.0])  # a_{i-1} [m]
+D = np.array([D1, 0.0, 0.0, D4, D5, D6])  # d_i [m]
+JOINT_LIMIT = 2 * np.pi  # [rad] each joint, both ways
+SPEED_LIMIT = np.pi  # [rad/s] each joint
+REACH = 0.85  # [m] published; beyond it a flange pose has no solution
+
+
+def link_frames(q: Float[ndarray, "*batch 6"]) -> Float[ndarray, "*batch 6 4 4"]:
+    """Pose in B of each of the six DH frames, for joint angles q [rad] (thesis eq 3.2-3.3)."""
+    q = np.asarray(q, float)
+    c, s = np.cos(q), np.sin(q)
+    ca, sa = np.cos(ALPHA), np.sin(ALPHA)
+    T = np.zeros((*q.shape, 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 3] = c, -s, A
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2], T[..., 1, 3] = s * ca, c * ca, -sa, -sa * D
+    T[..., 2, 0], T[..., 2, 1], T[..., 2, 2], T[..., 2, 3] = s * sa, c * sa, ca, ca * D
+    T[..., 3, 3] = 1.0
+    out = np.empty_like(T)
+    out[..., 0, :, :] = T[..., 0, :, :]
+    for i in range(1, 6):
+        out[..., i, :, :] = out[..., i - 1, :, :] @ T[..., i, :, :]
+    return out
+
+
+def flange_pose(q: Float[ndarray, "*batch 6"]) -> Transform:
+    """X_BF for joint angles q [rad]; any batch shape."""
+    return Transform.from_matrix("BF", link_frames(q)[..., 5, :, :])
+
+
+def torch_pose(q: Float[ndarray, "*batch 6"], X_FT: Transform = X_FT) -> Transform:
+    """X_BT for joint angles q [rad]; any batch shape."""
+    return flange_pose(q) @ X_FT
+
+
+def inverse(X_BF: Transform) -> Float[ndarray, "k 6"]:
+    """All joint solutions [rad] in (-pi, pi] of one flange pose; k is 0 (none) to 8."""
+    import ur_analytic_ik
+
+    solutions = ur_analytic_ik.ur5.inverse_kinematics(X_BF.matrix)
+    return np.array([np.asarray(solution, float).reshape(6) for solution in solutions]).reshape(-1, 6)
+
+
+def inverse_near(X_BF: Transform, q_near: Float[ndarray, "6"]) -> Float[ndarray, "6"]:
+    """The solution nearest to q_near [rad], each joint unwrapped by whole turns within its limits.
+
+    Raises:
+        UnreachableError: no solution; `data` has the flange's position and its distance from the base axis.
+    """
+    solutions = inverse(X_BF)
+    if len(solutions) == 0:
+        distance = float(np.linalg.norm(X_BF.p - [0.0, 0.0, D1]))
+        raise UnreachableError(
+            f"flange at ({X_BF.p[0]:.3f}, {X_BF.p[1]:.3f}, {X_BF.p[2]:.3f}) m in base: no joint solution,"
+            f" {distance:.3f} m from the shoulder (reach {REACH} m); move the part or turn the torch",
+            position=tuple(X_BF.p),
+            distance=distance,
+            reach=REACH,
+        )
+    turns = solutions + 2 * np.pi * np.round((q_near - solutions) / (2 * np.pi))
+    turns = np.where(np.abs(turns) > JOINT_LIMIT, solutions, turns)
+    return turns[np.abs(turns - q_near).max(axis=1).argmin()]

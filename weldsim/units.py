@@ -1,0 +1,65 @@
+"""Units at the text edge: "12 mm" in, SI out, and the reverse for people.
+
+Only `config`, `cli`, `console` and `report` import this module; everything inside weldsim is SI.
+"""
+
+import math
+import re
+
+from weldsim.errors import ConfigError
+
+_SCALES: dict[str, dict[str, float]] = {
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    "rad": {"rad": 1.0, "deg": math.pi / 180, "mrad": 1e-3},
+    "s": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "cm/min": 1e-2 / 60, "mm/min": 1e-3 / 60},
+    "rad/m": {"rad/m": 1.0, "deg/mm": math.pi / 180 * 1e3, "deg/m": math.pi / 180},
+    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180},
+    "px": {"px": 1.0},
+}
+_NUMBER_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z/]*)\s*")
+
+
+def parse(value: str | int | float, dimension: str, *, where: str = "value") -> float:
+    """The SI value of `value`, a bare SI number or text such as "12 mm".
+
+    Args:
+        value: a number (SI already) or text with a unit.
+        dimension: the SI unit expected, a key of the scale table ("m", "rad", "m/s", ...).
+        where: what to call the value in an error.
+    Raises:
+        ConfigError: text that is no number, an unknown unit, or a number that is not finite.
+    """
+    scales = _SCALES[dimension]
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise ConfigError(f"{where}: {value!r} is no quantity in {dimension}", value=value)
+    if isinstance(value, str):
+        match = _NUMBER_UNIT.fullmatch(value)
+        if match is None:
+            raise ConfigError(f'{where}: {value!r} is no quantity; write a number with a unit, "12 mm" say', value=value)
+        unit = match[2] or dimension
+        if unit not in scales:
+            raise ConfigError(f"{where}: unit {unit!r} is not one of {', '.join(scales)}", value=value, allowed=list(scales))
+        number = float(match[1]) * scales[unit]
+    else:
+        number = float(value)
+    if not math.isfinite(number):
+        raise ConfigError(f"{where}: {value!r} is not finite", value=value)
+    return number
+
+
+def length_scale(unit: str) -> float:
+    """Metres per `unit` of length. Raises ConfigError for an unknown one."""
+    if unit not in _SCALES["m"]:
+        raise ConfigError(f"unit {unit!r} is not one of {', '.join(_SCALES['m'])}", value=unit, allowed=list(_SCALES["m"]))
+    return _SCALES["m"][unit]
+
+
+def to_mm(metres: float) -> float:
+    """Millimetres."""
+    return metres * 1e3
+
+
+def to_deg(radians: float) -> float:
+    """Degrees."""
+    return math.degrees(radians)
