@@ -6,7 +6,6 @@ C camera (optical: x right, y down, z forward), P part, S seam. Composition chec
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from jaxtyping import Float
@@ -70,21 +69,21 @@ class Transform:
         object.__setattr__(self, "p", p)
 
     @classmethod
-    def identity(cls, names: str) -> Self:
+    def identity(cls, names: str) -> "Transform":
         return cls(names, np.eye(3), np.zeros(3))
 
     @classmethod
-    def from_matrix(cls, names: str, matrix: Float[ndarray, "*batch 4 4"]) -> Self:
+    def from_matrix(cls, names: str, matrix: Float[ndarray, "*batch 4 4"]) -> "Transform":
         """From homogeneous matrices, shape (..., 4, 4)."""
         matrix = np.asarray(matrix, float)
         return cls(names, matrix[..., :3, :3], matrix[..., :3, 3])
 
     @classmethod
-    def from_quaternion(cls, names: str, wxyz: Float[ndarray, "*batch 4"], p: Float[ndarray, "*batch 3"]) -> Self:
+    def from_quaternion(cls, names: str, wxyz: Float[ndarray, "*batch 4"], p: Float[ndarray, "*batch 3"]) -> "Transform":
         return cls(names, matrix_from_quaternion(wxyz), p)
 
     @classmethod
-    def from_rotation_vector(cls, names: str, rotvec: Float[ndarray, "*batch 3"], p: Float[ndarray, "*batch 3"]) -> Self:
+    def from_rotation_vector(cls, names: str, rotvec: Float[ndarray, "*batch 3"], p: Float[ndarray, "*batch 3"]) -> "Transform":
         return cls(names, matrix_from_rotation_vector(rotvec), p)
 
     @property
