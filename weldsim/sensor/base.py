@@ -1,0 +1,95 @@
+"""What a depth sensor is: a view in, a `Capture` out.
+
+The pipeline hands `Capture.frame` to perception and keeps `Capture.truth` for the report. A real camera and a replay
+have no truth; the twin has, and nothing after the sensor but the report may read it.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+from numpy import ndarray
+
+from weldsim.errors import RecordError
+from weldsim.frames import Transform, read_only
+from weldsim.records import CameraIntrinsics, DepthFrame
+
+
+class Label(IntEnum):
+    """What a pixel shows. NONE is a miss."""
+
+    NONE = 0
+    TABLE = 1
+    PART = 2
+    GROOVE = 3
+    CLAMP = 4
+    ROBOT = 5
+    OTHER = 6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class View:
+    """One exposure asked of a sensor.
+
+    Attributes:
+        X_BC: where the camera stands (its optical frame in the robot base).
+        exposure: counts exposures from the same place; noise that changes from frame to frame follows it.
+        t: time of exposure [s].
+    """
+
+    X_BC: Transform
+    exposure: int = 0
+    t: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.X_BC.names != "BC" or self.X_BC.batch:
+            raise RecordError(f"View.X_BC: is X_{self.X_BC.names} with batch {self.X_BC.batch}, expected one X_BC", field="X_BC")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Truth:
+    """What was really in view, known to the twin alone.
+
+    Attributes:
+        depth: exact z-depth at each pixel's centre [m], NaN where nothing is.
+        labels: a `Label` a pixel.
+    """
+
+    depth: Float32[ndarray, "h w"]
+    labels: UInt8[ndarray, "h w"]
+
+    def __post_init__(self) -> None:
+        if self.depth.shape != self.labels.shape:
+            raise RecordError(f"Truth.labels: shape {self.labels.shape}, expected {self.depth.shape}", field="labels")
+        object.__setattr__(self, "depth", read_only(np.asarray(self.depth, np.float32)))
+        object.__setattr__(self, "labels", read_only(np.asarray(self.labels, np.uint8)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Capture:
+    """One exposure: what the sensor delivers, and in the twin what was really there (None elsewhere)."""
+
+    frame: DepthFrame
+    truth: Truth | None = None
+
+
+class DepthSensor(ABC):
+    """A depth camera, real, simulated or recorded."""
+
+    @property
+    @abstractmethod
+    def intrinsics(self) -> CameraIntrinsics:
+        """Of the depth image it delivers."""
+
+    @abstractmethod
+    def capture(self, view: View) -> Capture:
+        """One exposure from `view`.
+
+        The frame's depth is float32 [m], positive, NaN for no return; its colour is registered to depth. The same sensor,
+        seed and view give the same bytes.
+
+        Raises:
+            SensorError: the sensor cannot deliver.
+        """

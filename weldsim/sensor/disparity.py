@@ -1,0 +1,115 @@
+"""What a window matcher does to a disparity image: average over its support, noise, trouble at edges.
+
+The pieces of the parametric D415 model, each a pure function on arrays. Disparity 0 stands for no surface.
+"""
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float32, Int
+from numpy import ndarray
+from numpy.random import Generator
+
+PATCH = 4  # [px] length over which an edge is displaced or dropped as one piece
+
+
+def support_average(
+    disparity: Float32[ndarray, "h w"], window: int, step: float
+) -> tuple[Float32[ndarray, "h w"], Float32[ndarray, "h w"]]:
+    """Mean disparity over each pixel's window and its spread there (max - min), both over one surface only [px].
+
+    Pixels of the window that differ from the middle one by `step` or more belong to another surface and are left out;
+    away from such edges this is a box filter.
+    """
+    kernel = np.ones((window, window), np.uint8)
+    mean = cv2.blur(disparity, (window, window), borderType=cv2.BORDER_REPLICATE)
+    high = cv2.dilate(disparity, kernel, borderType=cv2.BORDER_REPLICATE)
+    spread = high - cv2.erode(disparity, kernel, borderType=cv2.BORDER_REPLICATE)
+    mixed = np.flatnonzero((spread >= step) & (disparity > 0))
+    if mixed.size:
+        flat_mean, flat_spread = mean.reshape(-1), spread.reshape(-1)
+        flat_mean[mixed], flat_spread[mixed] = _average_of_own_surface(disparity, mixed, window, step)
+    return mean, spread
+
+
+def _average_of_own_surface(
+    disparity: Float32[ndarray, "h w"], pixels: Int[ndarray, "n"], window: int, step: float
+) -> tuple[Float32[ndarray, "n"], Float32[ndarray, "n"]]:
+    """Mean and spread over the window of each listed pixel, of the values within `step` of its own."""
+    height, width = disparity.shape
+    before, after = window // 2, window - 1 - window // 2
+    padded = cv2.copyMakeBorder(disparity, before, after, before, after, cv2.BORDER_REPLICATE).reshape(-1)
+    stride = width + window - 1
+    corner = pixels // width * stride + pixels % width
+    own = disparity.reshape(-1)[pixels]
+    total, count = np.zeros_like(own), np.zeros_like(own)
+    low, high = np.zeros_like(own), np.zeros_like(own)
+    for row in range(window):
+        for column in range(window):
+            # Differences from the middle pixel are small numbers, so that float32 sums stay exact to 1e-5 px.
+            difference = padded[corner + (row * stride + column)] - own
+            same = np.abs(difference) < step
+            difference *= same
+            total += difference
+            count += same
+            np.minimum(low, difference, out=low)
+            np.maximum(high, difference, out=high)
+    return own + total / count, high - low
+
+
+def correlated_field(rng: Generator, shape: tuple[int, int], length: float) -> Float32[ndarray, "h w"]:
+    """A Gaussian field of mean 0 and variance 1 whose correlation falls to 1/e at `length` [px].
+
+    White noise blurred by a Gaussian of deviation s has correlation exp(-r^2 / 4 s^2), so s is half the length.
+    """
+    deviation = length / 2
+    reach = max(1, round(3 * deviation))
+    kernel = cv2.getGaussianKernel(2 * reach + 1, deviation, cv2.CV_32F)
+    kernel /= np.linalg.norm(kernel)
+    white = rng.standard_normal((shape[0] + 2 * reach, shape[1] + 2 * reach), dtype=np.float32)
+    smooth = cv2.sepFilter2D(white, cv2.CV_32F, kernel, kernel)
+    return np.ascontiguousarray(smooth[reach:-reach, reach:-reach])
+
+
+def near_edges(disparity: Float32[ndarray, "h w"], step: float, reach: int) -> Int[ndarray, "n"]:
+    """Flat indices of the pixels within `reach` of a disparity step of at least `step`."""
+    around = np.ones((3, 3), np.uint8)
+    edge = (cv2.dilate(disparity, around) - cv2.erode(disparity, around)) >= step
+    if reach > 1:
+        edge = cv2.dilate(edge.astype(np.uint8), np.ones((2 * reach - 1, 2 * reach - 1), np.uint8))
+    return np.flatnonzero(edge)
+
+
+def patches(rng: Generator, shape: tuple[int, int], pixels: Int[ndarray, "n"]) -> Float32[ndarray, "n"]:
+    """Standard normal numbers at the listed pixels, one for each PATCH x PATCH block of the image."""
+    coarse = rng.standard_normal((-(-shape[0] // PATCH), -(-shape[1] // PATCH)), dtype=np.float32)
+    return coarse[pixels // shape[1] // PATCH, pixels % shape[1] // PATCH]
+
+
+def jitter_edges(
+    rng: Generator, disparity: Float32[ndarray, "h w"], edges: Int[ndarray, "n"], sigma: float
+) -> Float32[ndarray, "h w"]:
+    """The image with its edges displaced by about `sigma` px either way, a patch at a time."""
+    height, width = disparity.shape
+    rows = edges // width + np.rint(sigma * patches(rng, disparity.shape, edges)).astype(int)
+    columns = edges % width + np.rint(sigma * patches(rng, disparity.shape, edges)).astype(int)
+    out = disparity.copy()
+    out.reshape(-1)[edges] = disparity[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
+    return out
+
+
+def hidden_from_right(disparity: Float32[ndarray, "h w"], step: float) -> Bool[ndarray, "h w"]:
+    """Pixels of the left (depth) image that the right imager does not see: outside its image, or behind something.
+
+    A surface point at column u of the left image lies at u - d of the right one; the nearest there (largest d) wins.
+    """
+    height, width = disparity.shape
+    column = np.arange(width, dtype=np.float32) + 0.5 - disparity
+    outside = column < 0
+    cell = np.clip(column, 0, width - 1).astype(np.intp)
+    cell += np.arange(height, dtype=np.intp)[:, None] * width
+    nearest = np.zeros(height * width, np.float32)
+    keep = ~outside.reshape(-1)
+    np.maximum.at(nearest, cell.reshape(-1)[keep], disparity.reshape(-1)[keep])
+    # A surface turned towards the right imager leaves columns without a sample: fill gaps of two.
+    nearest = cv2.morphologyEx(nearest.reshape(height, width), cv2.MORPH_CLOSE, np.ones((1, 3), np.uint8))
+    return outside | (disparity < nearest.reshape(-1)[cell] - step)
