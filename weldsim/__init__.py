@@ -23,7 +23,22 @@ _PUBLIC = {
     "plan": "weldsim.pipeline",
     "run": "weldsim.pipeline",
 }
-__all__ = ["__version__", *_PUBLIC]
+__all__ = [
+    "CameraIntrinsics",
+    "CellConfig",
+    "DepthFrame",
+    "PointCloud",
+    "Seam",
+    "TorchPath",
+    "Transform",
+    "WeldReport",
+    "WeldsimError",
+    "__version__",
+    "load_config",
+    "plan",
+    "read_cloud",
+    "run",
+]
 
 if TYPE_CHECKING:
     from weldsim.cloud.files import read_cloud
