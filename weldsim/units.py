@@ -17,10 +17,13 @@ _SCALES: dict[str, dict[str, float]] = {
     "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180},
     "px": {"px": 1.0},
 }
+DIMENSIONS = frozenset(_SCALES)
+"""The SI units a quantity can be declared in."""
+
 _NUMBER_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z/]*)\s*")
 
 
-def parse(value: str | int | float, dimension: str, *, where: str = "value") -> float:
+def parse(value: object, dimension: str, *, where: str = "value") -> float:
     """The SI value of `value`, a bare SI number or text such as "12 mm".
 
     Args:

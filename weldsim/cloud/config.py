@@ -1,0 +1,39 @@
+"""CloudConfig: how a cloud is cleaned before a stage looks at it (read by `weldsim.cloud.filters.prepare`)."""
+
+from dataclasses import dataclass
+
+from weldsim.errors import ConfigError
+from weldsim.quantity import Metre
+
+
+@dataclass(frozen=True, kw_only=True)
+class CloudConfig:
+    """What is kept of a cloud. The defaults keep every point: the stages behind are made for clutter and noise."""
+
+    crop_min: tuple[Metre, Metre, Metre] | None = None
+    """Lower corner of the box that is kept, in the robot base; none keeps everything."""
+
+    crop_max: tuple[Metre, Metre, Metre] | None = None
+    """Upper corner of that box."""
+
+    voxel: Metre = 0.0
+    """Edge of the cubes whose points are averaged; 0 keeps the points as they are."""
+
+    outlier_radius: Metre = 0.0
+    """Points with fewer than `outlier_neighbours` others within this radius are dropped; 0 drops none."""
+
+    outlier_neighbours: int = 4
+    """How many neighbours a point needs within `outlier_radius`."""
+
+    def __post_init__(self) -> None:
+        if (self.crop_min is None) != (self.crop_max is None):
+            raise ConfigError("crop box: give both crop_min and crop_max, or neither", key="crop_min")
+        if self.crop_min is not None and self.crop_max is not None:
+            for axis, low, high in zip("xyz", self.crop_min, self.crop_max, strict=True):
+                if low >= high:
+                    raise ConfigError(f"crop box: {axis} from {low:g} m to {high:g} m holds nothing", key="crop_max", axis=axis)
+        for name in ("voxel", "outlier_radius"):
+            if getattr(self, name) < 0:
+                raise ConfigError(f"{name} = {getattr(self, name):g} m is negative; 0 switches it off", key=name)
+        if self.outlier_neighbours < 1:
+            raise ConfigError(f"outlier_neighbours = {self.outlier_neighbours}; at least 1 is needed", key="outlier_neighbours")

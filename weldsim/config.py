@@ -1,0 +1,94 @@
+"""CellConfig: the stage configs composed, read from TOML with overrides, written back as resolved JSON.
+
+A stage joins the cell with one line in `CellConfig` and one import; its config lives beside its reader (in a module that
+imports neither mujoco nor open3d, for every command reads this page).
+"""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from weldsim.cloud.config import CloudConfig
+from weldsim.errors import ConfigError
+from weldsim.motion.config import MotionConfig
+from weldsim.schema import describe, structure, to_json
+from weldsim.seam.config import SeamConfig
+
+__all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config", "load_toml", "structure", "to_json"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellConfig:
+    """Everything that a job can be told, one table a stage. To add a stage: import its config, add its line here."""
+
+    cloud: CloudConfig = field(default_factory=CloudConfig)
+    """What is kept of the cloud."""
+
+    seam: SeamConfig = field(default_factory=SeamConfig)
+    """Which seam finder runs, and its settings."""
+
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    """What motion planning may choose."""
+
+
+def load_toml(path: str | Path) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises:
+        ConfigError: the file is missing, unreadable, not UTF-8 or not TOML (with the line).
+    """
+    try:
+        return tomllib.loads(Path(path).read_bytes().decode())
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file", path=str(path)) from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})", path=str(path)) from None
+    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
+        raise ConfigError(f"{path}: no TOML: {reason}", path=str(path)) from None
+
+
+def load_config(path: str | Path | None = None, overrides: Iterable[str] = ()) -> CellConfig:
+    """The cell's config from a TOML file (or the defaults) with `key=value` overrides. Raises ConfigError."""
+    data = apply_overrides({} if path is None else load_toml(path), overrides)
+    return structure(data, CellConfig, where="config" if path is None else str(path))
+
+
+def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """A copy of `data` with every `dotted.key=value` set; the value is TOML if it reads as such, else plain text.
+
+    Raises:
+        ConfigError: no `=`, an empty key, or a key that leads through a value.
+    """
+    result: dict[str, Any] = deepcopy(dict(data))
+    for text in overrides:
+        key, equals, value = text.partition("=")
+        parts = [part.strip() for part in key.split(".")]
+        if not equals or not all(parts):
+            raise ConfigError(f"override {text!r}: write dotted.key=value, seam.method=thesis say", value=text)
+        table = result
+        for depth, part in enumerate(parts[:-1]):
+            table = table.setdefault(part, {})
+            if not isinstance(table, dict):
+                raise ConfigError(f"override {text!r}: {'.'.join(parts[: depth + 1])} is a value, not a table", value=text)
+        table[parts[-1]] = _toml_value(value.strip())
+    return result
+
+
+def _toml_value(text: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return parsed["value"] if list(parsed) == ["value"] else text
+
+
+def digest(config: Any) -> str:
+    """The first 16 hex digits of the SHA-256 of the config's canonical JSON."""
+    canonical = json.dumps(to_json(config), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(canonical.encode()).hexdigest()[:16]
