@@ -1,0 +1,104 @@
+"""How well the arm followed its path: distance of the measured tip from the planned line, and its speed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from weldsim.quantity import Second
+from weldsim.records import ExecutionLog, TorchPath
+from weldsim.report.metrics import Offsets, offsets
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackingError:
+    """Measured tip from the planned line while the arc burns.
+
+    Attributes:
+        mean, p95, max: [m].  offsets: of each instant with the arc on.
+    """
+
+    mean: float
+    p95: float
+    max: float
+    offsets: Offsets
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedRule:
+    """Where torch speed is judged.
+
+    Attributes:
+        window: speed is the distance between the tip's positions half a window before and after, over the window.
+            Long enough that encoder noise does not count, short against what a weld pool notices.
+        ramp: time left out after the arc starts and before it stops, where the arm speeds up and slows down.
+    """
+
+    window: Second = 0.1
+    ramp: Second = 0.3
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SpeedError:
+    """Torch speed against plan on the weld.
+
+    Attributes:
+        p95, max: |speed - planned| / planned, outside the ramps.
+        s, speed, planned: (k,) arc length [m], measured and planned speed [m/s] with the arc on.
+        judged: (k,) which instants count.
+    """
+
+    p95: float
+    max: float
+    s: Float[ndarray, "k"]
+    speed: Float[ndarray, "k"]
+    planned: Float[ndarray, "k"]
+    judged: Bool[ndarray, "k"]
+
+
+def tracking_error(tip_B: Float[ndarray, "k 3"], planned_B: Float[ndarray, "n 3"]) -> TrackingError:
+    """Perpendicular distance of each measured tip position from the planned line, which goes on straight past its ends.
+
+    Being early or late on the line is not an error here: it is one of speed.
+    """
+    moved = np.concatenate([[True], np.linalg.norm(np.diff(planned_B, axis=0), axis=1) > 0])
+    found = offsets(tip_B, planned_B[moved])
+    return TrackingError(
+        mean=float(found.distance.mean()),
+        p95=float(np.percentile(found.distance, 95)),
+        max=float(found.distance.max()),
+        offsets=found,
+    )
+
+
+def speed_error(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = None) -> SpeedError | None:
+    """Relative speed error while the arc burns; None when the weld is shorter than its ramps.
+
+    Args:
+        log: what the arm did.  path: what was planned; its speed is looked up at the commanded arc length.
+        rule: the averaging window and the ramps left out.
+    """
+    rule = rule or SpeedRule()
+    on = np.flatnonzero(log.arc_on)
+    if len(on) < 2:
+        return None
+    t = log.t[on]
+    half = rule.window / 2
+    p = log.X_BT_act.p
+    before, after = (np.stack([np.interp(t + h, log.t, p[:, i]) for i in range(3)], axis=1) for h in (-half, half))
+    span = np.clip(t + half, log.t[0], log.t[-1]) - np.clip(t - half, log.t[0], log.t[-1])
+    speed = np.linalg.norm(after - before, axis=1) / span
+    planned = np.interp(log.s_cmd[on], path.s, path.speed)
+    judged = (t >= t[0] + rule.ramp) & (t <= t[-1] - rule.ramp)
+    if not judged.any():
+        return None
+    error = np.abs(speed - planned)[judged] / planned[judged]
+    return SpeedError(
+        p95=float(np.percentile(error, 95)),
+        max=float(error.max()),
+        s=log.s_cmd[on],
+        speed=speed,
+        planned=planned,
+        judged=judged,
+    )
