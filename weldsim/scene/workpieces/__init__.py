@@ -1,0 +1,1 @@
+"""Workpieces: solids with their true seams."""
