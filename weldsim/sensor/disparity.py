@@ -35,7 +35,7 @@ def _average_of_own_surface(
     disparity: Float32[ndarray, "h w"], pixels: Int[ndarray, "n"], window: int, step: float
 ) -> tuple[Float32[ndarray, "n"], Float32[ndarray, "n"]]:
     """Mean and spread over the window of each listed pixel, of the values within `step` of its own."""
-    height, width = disparity.shape
+    width = disparity.shape[1]
     before, after = window // 2, window - 1 - window // 2
     padded = cv2.copyMakeBorder(disparity, before, after, before, after, cv2.BORDER_REPLICATE).reshape(-1)
     stride = width + window - 1

@@ -34,7 +34,7 @@ class EmbreeRenderer(Renderer):
         # Rays with z = 1 in C: the distance along the ray is the z-depth itself.
         directions = (intrinsics.rays().reshape(-1, 3) @ X_WC.R.T).astype(np.float32)
         rays = np.concatenate([np.broadcast_to(X_WC.p.astype(np.float32), directions.shape), directions], axis=1)
-        hit = self._scene.cast_rays(o3d.core.Tensor(rays.reshape(intrinsics.height, intrinsics.width, 6)))
+        hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(rays.reshape(intrinsics.height, intrinsics.width, 6)))
         z = hit["t_hit"].numpy()
         seen = np.isfinite(z)
         geom = np.where(seen, self._geom_of_id[np.where(seen, hit["geometry_ids"].numpy(), 0)], -1).astype(np.int32)
@@ -42,6 +42,9 @@ class EmbreeRenderer(Renderer):
         if not depth:
             return Render(depth=np.full_like(z, np.nan), geom=np.full_like(geom, -1), colour=picture)
         return Render(depth=np.where(seen, z, np.float32(np.nan)), geom=geom, colour=picture)
+
+    def close(self) -> None:
+        self._scene, self._placed = o3d.t.geometry.RaycastingScene(), None
 
     def _place(self, data: mujoco.MjData) -> None:
         """Builds the ray-casting scene for the present geom poses, unless it stands already."""
@@ -52,7 +55,7 @@ class EmbreeRenderer(Renderer):
         ids = []
         for k, solid in enumerate(self._triangles):
             vertices = (solid.vertices @ R[k].T + p[k]).astype(np.float32)
-            ids.append(self._scene.add_triangles(o3d.core.Tensor(vertices), o3d.core.Tensor(solid.faces)))
+            ids.append(self._scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(solid.faces)))
         self._geom_of_id = np.zeros(max(ids, default=0) + 1, np.int32)
         self._geom_of_id[ids] = self._geoms
         self._placed = (p.copy(), R.copy())

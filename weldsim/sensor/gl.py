@@ -31,9 +31,10 @@ class GlRenderer(Renderer):
         self._model = model
         self._context = gl_context_class(platform)(model.vis.global_.offwidth, model.vis.global_.offheight)
         self._context.make_current()
-        self._drawing = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._drawing)
-        self._drawing.readDepthMap = int(mujoco.mjtDepthMap.mjDEPTH_ZEROFAR)
+        drawing = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, drawing)
+        drawing.readDepthMap = int(mujoco.mjtDepthMap.mjDEPTH_ZEROFAR)
+        self._drawing = drawing
         self._scene = mujoco.MjvScene(model, max_geom)
         self._option = _geoms_only()
 

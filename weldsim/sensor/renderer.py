@@ -46,8 +46,9 @@ class Renderer(ABC):
     ) -> Render:
         """What a pinhole camera at X_WC sees of `data`; without `depth`, depth and geom are all misses (pictures, video)."""
 
+    @abstractmethod
     def close(self) -> None:
-        """Frees what the renderer holds outside Python."""
+        """Frees what the renderer holds outside Python; closing twice is allowed."""
 
 
 def make_renderer(model: "mujoco.MjModel", backend: Backend | Literal["auto"] = "auto") -> Renderer:

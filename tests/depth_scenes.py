@@ -1,5 +1,7 @@
 """Exact depth in closed form of prismatic surfaces, for tests of the depth model without rendering."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy import ndarray
 
@@ -29,7 +31,7 @@ def profile_depth(
     R_PC, origin = part_from_camera(z, rotation, tilt)
     direction = intrinsics.rays() @ R_PC.T
     best = np.full(direction.shape[:2], np.inf)
-    for (x0, h0), (x1, h1) in zip(profile[:-1], profile[1:], strict=True):
+    for (x0, h0), (x1, h1) in pairwise(profile):
         slope = (h1 - h0) / (x1 - x0)
         # On the segment h = h0 + slope (x - x0), with x = ox + t dx and h = oz + t dz.
         with np.errstate(divide="ignore", invalid="ignore"):
