@@ -1,0 +1,117 @@
+"""The verdict: a good weld passes, each fault alone fails it and is named with its figure and limit."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.seams import findings, found_seam, sine_seam, torch_path, weld_log
+from weldsim.records import WeldReport
+from weldsim.report.limits import ReportConfig, checks
+from weldsim.report.weld import report_json, weld_report
+
+
+def job(offset: float = 2e-4, seed: int = 0, *, factor: float = 1.0, side: float = 0.0, executed: bool = True) -> WeldReport:
+    """A weld `offset` [m] beside the seam, executed `side` [m] beside its plan at `factor` times its speed."""
+    rng = np.random.default_rng(seed)
+    known = sine_seam(rng)
+    seam = found_seam(known, offset + 1e-4 * np.sin(known.s / 0.01))
+    path = torch_path(seam)
+    driven = torch_path(found_seam(known, offset + side + 1e-4 * np.sin(known.s / 0.01)))
+    log = weld_log(driven, rng, factor=factor, jitter=2e-6) if executed else None
+    region = rng.random(1000) < 0.3
+    return weld_report(
+        findings((seam,), region),
+        (path,),
+        scene="sine",
+        log=log,
+        known=(known,),
+        true_region=region,
+        timing={"seam": 0.1},
+        seed=seed,
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_good_weld_passes_and_says_by_how_much(seed: int) -> None:
+    report = job(seed=seed)
+    assert report.passed
+    assert any("plan, cross-track mean" in reason and "limit" in reason for reason in report.reasons)
+    assert report.plan is not None
+    assert report.executed is not None
+    assert abs(report.plan.mean - 2e-4) < 2e-5
+    assert abs(report.executed.mean - report.plan.mean) < 5e-6
+    assert report.tracking_p95 is not None
+    assert report.tracking_p95 < 2e-5
+    assert report.iou == 1.0
+
+
+FAULTS = {
+    "plan, cross-track mean": {"offset": 6e-4},
+    "executed tip from plan, p95": {"offset": -3e-4, "side": 6e-4},
+    "torch speed error, p95": {"factor": 1.04},
+}
+
+
+@pytest.mark.parametrize("figure", FAULTS)
+def test_each_fault_is_named_with_value_and_limit(figure: str) -> None:
+    report = job(**FAULTS[figure])
+    assert not report.passed
+    (reason,) = [reason for reason in report.reasons if reason.startswith(figure)]
+    assert "(limit <= " in reason
+    assert all("limit" in reason for reason in report.reasons)
+
+
+def test_every_limit_decides_alone() -> None:
+    report = job()
+    tight = {
+        field: 0.0 if field not in ("coverage", "phantoms") else {"coverage": 1.1, "phantoms": -1}[field]
+        for field in ReportConfig.__dataclass_fields__
+    }
+    names = set()
+    for field, limit in tight.items():
+        failed = [c.figure for c in checks(report, replace(ReportConfig(), **{field: limit})) if c.passed is False]
+        assert failed, field
+        names |= set(failed)
+    assert names == {c.figure for c in checks(report, ReportConfig()) if c.passed is not None}
+
+
+def test_missed_and_phantom_seams_fail() -> None:
+    rng = np.random.default_rng(3)
+    known = sine_seam(rng)
+    far = found_seam(known, np.full(len(known.s), 0.03))
+    region = np.zeros(10, bool)
+    report = weld_report(findings((far,), region), (torch_path(far),), scene="x", known=(known,))
+    assert report.phantom_seams == 1
+    assert report.plan is None
+    assert any("sine was not found" in reason for reason in report.reasons)
+    assert any(reason.startswith("phantom seams 1") for reason in report.reasons)
+    plain = weld_report(findings((), region), (), scene="plate", known=())
+    assert plain.passed
+    assert weld_report(findings((), region), (), scene="plate").reasons == ("no seam was found",)
+    assert weld_report(findings((far,), region), (torch_path(far),), scene="scan").passed
+
+
+def test_an_arc_that_never_burned_is_a_failure() -> None:
+    rng = np.random.default_rng(4)
+    known = sine_seam(rng)
+    seam = found_seam(known, np.zeros(len(known.s)))
+    path = torch_path(seam)
+    log = weld_log(path, rng)
+    dark = replace(log, arc_on=np.zeros(len(log.t), bool))
+    report = weld_report(findings((seam,), np.zeros(5, bool)), (path,), scene="x", log=dark, known=(known,))
+    assert "the arc never burned" in report.reasons
+    assert report.executed is None
+
+
+def test_json_is_strict_and_complete() -> None:
+    report = replace(job(), iou=math.nan)
+    data = json.loads(json.dumps(report_json(report), allow_nan=False))
+    assert data["schema"] == "weldsim.report/1"
+    assert data["iou"] is None
+    assert data["plan"]["mean"] == report.plan.mean  # type: ignore[union-attr]
+    assert len(data["checks"]) == len(checks(report, ReportConfig()))
+    assert set(WeldReport.__dataclass_fields__) <= set(data)
+    assert "weldsim" in data["versions"]
