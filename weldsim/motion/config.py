@@ -1,0 +1,66 @@
+"""What motion planning may choose: lead-in and lead-out, limits of the arm and of the tip, tolerances of the plan."""
+
+from dataclasses import dataclass
+
+from weldsim.errors import ConfigError
+from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre, RadianPerSecond, Second
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Settings of `plan_motion`. The welding speed is not here: it belongs to the path."""
+
+    period: Second = 0.008
+    """Sampling period of the joint trajectory; a CB3 controller streams at 125 Hz."""
+    approach: Metre = 0.05
+    """Straight lead-in along the wire before the weld, and lead-out after it, where the path brings none of its own."""
+    lead_speed: MetrePerSecond = 0.10
+    """Greatest tip speed on the lead-in and lead-out."""
+    tip_acceleration: float = 0.5
+    """Greatest tip acceleration along any straight or welded piece [m/s2]; 8 mm/s is reached within 0.5 mm."""
+    tip_jerk: float = 20.0
+    """Greatest tip jerk along any straight or welded piece [m/s3]."""
+    joint_speed: RadianPerSecond = 1.05
+    """Greatest joint speed of an air move, the 60 deg/s that UR controllers use by default."""
+    joint_acceleration: float = 1.4
+    """Greatest joint acceleration of an air move [rad/s2], the 80 deg/s2 that UR controllers use by default."""
+    joint_jerk: float = 15.0
+    """Greatest joint jerk of an air move [rad/s3]."""
+    joint_speed_limit: RadianPerSecond = 3.0
+    """Joint speed that no sample may exceed (published limit 180 deg/s): a weld slows down before it is reached."""
+    joint_acceleration_limit: float = 10.0
+    """Joint acceleration that no sample may exceed [rad/s2]: a weld slows down before it is reached."""
+    limit_margin: Radian = 0.1
+    """Distance kept from each joint's end stop."""
+    grid: Metre = 0.002
+    """First spacing of the poses that differential kinematics solves; halved where the joint spline strays."""
+    spline_tolerance: Metre = 0.00002
+    """Greatest distance of the joint spline's tip from the path between the solved poses."""
+    position_tolerance: Metre = 0.00001
+    """Greatest distance of a solved pose from the path."""
+    axis_tolerance: Radian = 0.00087
+    """Greatest angle between the wire and the path's wire axis at a solved pose (0.05 deg)."""
+    joint_rate: RadianPerMetre = 60.0
+    """Greatest change of any joint per length of path: more is a branch flip or a singularity."""
+    rolls: int = 24
+    """How many rotations about the wire are tried for the first pose."""
+    candidates: int = 6
+    """How many arm postures are followed before the path is called infeasible."""
+    floor: Metre = 0.0
+    """Height of the table top in the base frame."""
+    clearance: Metre = 0.08
+    """Distance kept between the arm's centre lines and the table, and between the torch and the arm."""
+    return_home: bool = True
+    """Whether the arm goes back to where it started."""
+
+    def __post_init__(self) -> None:
+        positive = (
+            "period lead_speed tip_acceleration tip_jerk joint_speed joint_acceleration joint_jerk joint_speed_limit"
+            " joint_acceleration_limit grid spline_tolerance position_tolerance axis_tolerance joint_rate rolls candidates"
+        )
+        for name in positive.split():
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"motion.{name} = {getattr(self, name)}: must be positive", key=f"motion.{name}")
+        for name in ("approach", "limit_margin", "clearance"):
+            if getattr(self, name) < 0:
+                raise ConfigError(f"motion.{name} = {getattr(self, name)}: must not be negative", key=f"motion.{name}")

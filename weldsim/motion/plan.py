@@ -1,0 +1,147 @@
+"""Torch path to joint trajectory: choose how to hold the arm, follow the path, time it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.errors import MotionError
+from weldsim.frames import Transform
+from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
+from weldsim.motion.arm import kinematic_model
+from weldsim.motion.config import MotionConfig
+from weldsim.motion.follow import JointPath, LostPathError, follow
+from weldsim.motion.posture import Blocked, Posture, find_postures, unreachable
+from weldsim.motion.rail import Rail, make_rail
+from weldsim.motion.timing import Move, air_move, piece_move
+from weldsim.mounts import X_FT as NOMINAL_X_FT
+from weldsim.records import JointTrajectory, Segment, TorchPath
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MotionPlan:
+    """A joint trajectory and what is worth knowing about it.
+
+    Attributes:
+        trajectory: from the start configuration through the weld; `s` has the path's own zero (negative on the lead-in).
+        rail: the tip's line, leads included; `rail.at(s)` is the pose asked for at arc length s.
+        position_error, axis_error: greatest distance [m] and angle [rad] of the joint path from the rail.
+        slowest: least ratio of planned to asked welding speed; below 1 a joint limit made the weld slower.
+        dexterity, clearance: least on the way [m/rad], [m].  roll: rotation about the wire chosen [rad].
+        notes: one sentence each, for people.
+    """
+
+    trajectory: JointTrajectory
+    rail: Rail
+    position_error: float
+    axis_error: float
+    slowest: float
+    dexterity: float
+    clearance: float
+    roll: float
+    notes: tuple[str, ...] = ()
+
+
+def plan_motion(
+    path: TorchPath,
+    q_start: Float[ndarray, "6"],
+    config: MotionConfig | None = None,
+    X_FT: Transform = NOMINAL_X_FT,
+    blocked: Blocked | None = None,
+) -> MotionPlan:
+    """The joint trajectory that welds the path: air move, lead-in, weld at the path's speed, lead-out, air move home.
+
+    Args:
+        path: torch poses; leads are added along the wire where it has none.
+        q_start: joint angles at t = 0 [rad].
+        X_FT: flange to torch tip.
+        blocked: names what a configuration touches, or None; postures that touch anything are not used.
+    Raises:
+        UnreachableError: a pose no posture reaches; `data`: index, s, position, distance, reach.
+        MotionError: reachable pose by pose, but in no single sweep of the arm; `data`: index, s, reason.
+    """
+    config = config or MotionConfig()
+    if np.abs(q_start).max() > JOINT_LIMIT:
+        raise MotionError(
+            f"start: joint {int(np.abs(q_start).argmax()) + 1} is beyond +-360 deg", joint=int(np.abs(q_start).argmax())
+        )
+    rail = make_rail(path, config)
+    posture, paths = _first_that_holds(rail, find_postures(rail, q_start, X_FT, config, blocked), X_FT, config)
+    moves = [piece_move(rail, piece, config) for piece in paths]
+    first, last = moves[0], moves[-1]
+    moves.insert(0, air_move(q_start, first.q[0], float(first.s[0]), config))
+    if config.return_home:
+        moves.append(air_move(last.q[-1], q_start, float(last.s[-1]), config))
+    slowest = min(move.slowest for move in moves if move.segment == Segment.WELD)
+    notes = []
+    if slowest < 0.999:
+        notes.append(f"joint limits slow the weld to {100 * slowest:.0f} % of the asked speed at the slowest place")
+    if posture.clearance < config.clearance:
+        notes.append(
+            f"the arm passes {1e3 * posture.clearance:.0f} mm from the table or itself (asked {1e3 * config.clearance:.0f} mm)"
+        )
+    return MotionPlan(
+        trajectory=_join(moves, path, rail, config),
+        rail=rail,
+        position_error=max(piece.position_error for piece in paths),
+        axis_error=max(piece.axis_error for piece in paths),
+        slowest=slowest,
+        dexterity=posture.dexterity,
+        clearance=posture.clearance,
+        roll=posture.roll,
+        notes=tuple(notes),
+    )
+
+
+def _first_that_holds(
+    rail: Rail, postures: list[Posture], X_FT: Transform, config: MotionConfig
+) -> tuple[Posture, list[JointPath]]:
+    """The best posture that can be followed all along, and its joint paths."""
+    model = kinematic_model(X_FT)
+    lost: list[LostPathError] = []
+    for posture in postures[: config.candidates]:
+        try:
+            return posture, follow(rail, posture.q[0], posture.q.mean(axis=0), model, X_FT, config)
+        except LostPathError as error:
+            lost.append(error)
+    if not postures:
+        raise MotionError(
+            "path: every pose can be reached, but no posture of the arm sweeps the whole path without changing branch or touching"
+            " something; split the seam, move the part or allow rotation about the wire",
+            index=0,
+            s=rail.start,
+            reason="no posture",
+        )
+    furthest = max(lost, key=lambda error: float(str(error.data["s"])))
+    s, reason = float(str(furthest.data["s"])), str(furthest.data["reason"])
+    if reason == "out of reach":
+        raise unreachable(rail, s, "the arm cannot follow the path to here in any posture") from furthest
+    raise MotionError(
+        f"path pose {rail.path_index(s)}: no posture follows the path beyond {furthest}",
+        index=rail.path_index(s),
+        s=s,
+        reason=reason,
+    ) from furthest
+
+
+def _join(moves: list[Move], path: TorchPath, rail: Rail, config: MotionConfig) -> JointTrajectory:
+    """The moves one after the other; each starts from the rest in which the last one ended."""
+    keep = [slice(0, None)] + [slice(1, None)] * (len(moves) - 1)
+    q, qd, qdd, s = (
+        np.concatenate([getattr(m, name)[k] for m, k in zip(moves, keep, strict=True)]) for name in ("q", "qd", "qdd", "s")
+    )
+    segments = [m.segment for m, k in zip(moves, keep, strict=True) for _ in range(len(m.s[k]))]
+    burning = path.arc_on[path.weld]
+    nearest = np.searchsorted(path.s[path.weld], s, side="right") - 1
+    arc = np.array([segment == Segment.WELD for segment in segments]) & burning[np.clip(nearest, 0, len(burning) - 1)]
+    return JointTrajectory(
+        t=config.period * np.arange(len(s)),
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        s=s,
+        arc_on=arc,
+        segments=tuple(segments),
+        joint_names=JOINT_NAMES,
+    )

@@ -1,0 +1,156 @@
+"""When: jerk-limited profiles by ruckig for air moves and for the tip's arc length, sampled at the robot's period.
+
+`intermediate_positions` is never set: the free ruckig would send them to a remote service.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import ruckig
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.errors import MotionError
+from weldsim.motion.config import MotionConfig
+from weldsim.motion.follow import JointPath
+from weldsim.motion.rail import Rail
+from weldsim.records import Segment
+
+BLOCK = 0.005  # [m] a weld slows down over whole blocks of this length
+HEADROOM = 0.97  # of a joint limit, so that the ramps between blocks stay inside it
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Move:
+    """One motion from rest to rest, sampled from its first instant (t = 0) every period; the last sample is at rest.
+
+    Attributes:
+        segment: what it is.  q, qd, qdd: (k, 6).  s: (k,) [m].  speed: (k,) tip speed along the rail [m/s], 0 in the air.
+        slowest: least ratio of planned to asked tip speed, 1 where the limits never bite.
+    """
+
+    segment: Segment
+    q: Float[ndarray, "k 6"]
+    qd: Float[ndarray, "k 6"]
+    qdd: Float[ndarray, "k 6"]
+    s: Float[ndarray, "k"]
+    speed: Float[ndarray, "k"]
+    slowest: float = 1.0
+
+
+def _sample(trajectory: ruckig.Trajectory, start: float, period: float, n: int) -> ndarray:
+    """Position, speed and acceleration (n, 3, dofs) every period from `start`, held at the end."""
+    times = np.minimum(start + period * np.arange(n), trajectory.duration)
+    return np.array([trajectory.at_time(float(t))[:3] for t in times])
+
+
+def _solve(otg: ruckig.Ruckig, request: ruckig.InputParameter, dofs: int, what: str) -> ruckig.Trajectory:
+    trajectory = ruckig.Trajectory(dofs)
+    result = otg.calculate(request, trajectory)
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise MotionError(f"{what}: no jerk-limited profile ({result}); check the limits in the motion config", result=str(result))
+    return trajectory
+
+
+def air_move(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config: MotionConfig) -> Move:
+    """The quickest straight joint move from q0 to q1 [rad], all joints arriving together; `s` is what it is labelled with."""
+    request = ruckig.InputParameter(6)
+    request.current_position, request.target_position = list(map(float, q0)), list(map(float, q1))
+    request.max_velocity = [min(config.joint_speed, config.joint_speed_limit)] * 6
+    request.max_acceleration = [min(config.joint_acceleration, config.joint_acceleration_limit)] * 6
+    request.max_jerk = [config.joint_jerk] * 6
+    request.synchronization = ruckig.Synchronization.Phase
+    trajectory = _solve(ruckig.Ruckig(6), request, 6, "air move")
+    n = int(np.ceil(trajectory.duration / config.period - 1e-9)) + 1
+    q, qd, qdd = np.moveaxis(_sample(trajectory, 0.0, config.period, n), 1, 0)
+    # Once held, ruckig repeats the last speed and acceleration, which are zero only to rounding.
+    qd[-1], qdd[-1] = 0.0, 0.0
+    return Move(segment=Segment.AIR, q=q, qd=qd, qdd=qdd, s=np.full(n, s), speed=np.zeros(n))
+
+
+def piece_move(rail: Rail, path: JointPath, config: MotionConfig) -> Move:
+    """The tip along one piece at its asked speed, slower where a joint limit asks for it, at rest at both ends."""
+    edges, limit, slowest = _speed_limits(rail, path, config)
+    profile = _arc_profile(edges, limit, config)
+    s, ds, dds = profile.T
+    q1, q2 = path.spline(s, 1), path.spline(s, 2)
+    return Move(
+        segment=path.segment,
+        q=path.spline(s),
+        qd=q1 * ds[:, None],
+        qdd=q2 * (ds**2)[:, None] + q1 * dds[:, None],
+        s=s,
+        speed=ds,
+        slowest=slowest,
+    )
+
+
+def _speed_limits(
+    rail: Rail, path: JointPath, config: MotionConfig
+) -> tuple[Float[ndarray, "b_plus_1"], Float[ndarray, "b"], float]:
+    """Edges of the blocks of constant speed [m], the speed in each [m/s], and the least ratio to the asked speed."""
+    start, end = float(path.spline.x[0]), float(path.spline.x[-1])
+    edges = np.linspace(start, end, max(1, round((end - start) / BLOCK)) + 1)
+    inside = (rail.s > start + 1e-9) & (rail.s < end - 1e-9)
+    changes = rail.s[inside][np.diff(rail.speed[inside], prepend=rail.speed[inside][:1]) != 0] if inside.any() else np.zeros(0)
+    edges = np.unique(np.concatenate([edges, changes]))
+    edges = edges[np.concatenate([[True], np.diff(edges) > 1e-6])]
+    edges[-1] = end
+    middle = (edges[:-1] + edges[1:]) / 2
+    i = np.clip(np.searchsorted(rail.s, middle, side="right") - 1, 0, len(rail.s) - 2)
+    # Inside the weld the slower neighbour counts; a lead has its own speed at its far end alone.
+    pick = np.minimum if path.segment == Segment.WELD else np.maximum
+    asked = pick(rail.speed[i], rail.speed[i + 1])
+    u = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 9)
+    rate, bend = np.abs(path.spline(u, 1)).max(axis=(1, 2)), np.abs(path.spline(u, 2)).max(axis=(1, 2))
+    # A ramp adds the joint acceleration of the tip's own; what it leaves is for the bend of the joint path.
+    left = np.maximum(
+        HEADROOM * config.joint_acceleration_limit - rate * config.tip_acceleration, 0.1 * config.joint_acceleration_limit
+    )
+    allowed = np.minimum(HEADROOM * config.joint_speed_limit / np.maximum(rate, 1e-9), np.sqrt(left / np.maximum(bend, 1e-9)))
+    limit = np.minimum(asked, allowed)
+    same = np.concatenate([[True], np.abs(np.diff(limit)) > 1e-9])
+    return np.append(edges[:-1][same], end), limit[same], float((limit / asked).min())
+
+
+def _arc_profile(edges: Float[ndarray, "b_plus_1"], limit: Float[ndarray, "b"], config: MotionConfig) -> Float[ndarray, "k 3"]:
+    """Arc length, speed and acceleration of the tip (k, 3) every period: at the limit wherever the ramps allow."""
+    between = np.concatenate([[0.0], np.minimum(limit[:-1], limit[1:]), [0.0]])
+    between = _reachable(edges, between, config)
+    rows, clock = [], 0.0
+    for a, b, v0, v1, cap in zip(edges[:-1], edges[1:], between[:-1], between[1:], limit, strict=True):
+        request = ruckig.InputParameter(1)
+        request.current_position, request.target_position = [float(a)], [float(b)]
+        request.current_velocity, request.target_velocity = [float(v0)], [float(v1)]
+        request.max_velocity = [float(max(cap, v0, v1))]
+        request.max_acceleration, request.max_jerk = [config.tip_acceleration], [config.tip_jerk]
+        trajectory = _solve(ruckig.Ruckig(1), request, 1, f"arc length {1e3 * a:.1f} to {1e3 * b:.1f} mm")
+        n = max(0, int(np.ceil((trajectory.duration - clock) / config.period - 1e-9)))
+        rows.append(_sample(trajectory, clock, config.period, n)[..., 0] if n else np.zeros((0, 3)))
+        clock += n * config.period - trajectory.duration
+    rows.append(np.array([[edges[-1], 0.0, 0.0]]))
+    profile = np.concatenate(rows)
+    profile[:, 0] = np.clip(profile[:, 0], edges[0], edges[-1])
+    return profile
+
+
+def _reachable(
+    edges: Float[ndarray, "b_plus_1"], speed: Float[ndarray, "b_plus_1"], config: MotionConfig
+) -> Float[ndarray, "b_plus_1"]:
+    """Edge speeds lowered until each block is long enough to change from one to the next within acceleration and jerk."""
+    speed = speed.copy()
+    for order in (range(len(edges) - 1), range(len(edges) - 2, -1, -1)):
+        for k in order:
+            low, high = sorted((k, k + 1), key=lambda e: speed[e])
+            length, best = edges[k + 1] - edges[k], speed[high]
+            while _ramp(speed[low], best, config) > length and best > speed[low]:
+                best = max(speed[low], best - 0.05 * (speed[high] - speed[low]) - 1e-9)
+            speed[high] = best
+    return speed
+
+
+def _ramp(v0: float, v1: float, config: MotionConfig) -> float:
+    """Length [m] needed to change speed from v0 to v1 with both accelerations zero at the ends."""
+    dv, a, j = abs(v1 - v0), config.tip_acceleration, config.tip_jerk
+    time = 2 * np.sqrt(dv / j) if dv <= a * a / j else dv / a + a / j
+    return float((v0 + v1) / 2 * time)
