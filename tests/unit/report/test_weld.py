@@ -67,7 +67,7 @@ def test_each_fault_is_named_with_value_and_limit(figure: str) -> None:
 def test_every_limit_decides_alone() -> None:
     report = job()
     tight = {
-        field: 0.0 if field not in ("coverage", "phantoms") else {"coverage": 1.1, "phantoms": -1}[field]
+        field: -1.0 if field not in ("coverage", "phantoms") else {"coverage": 1.1, "phantoms": -1}[field]
         for field in ReportConfig.__dataclass_fields__
     }
     names = set()
