@@ -1,0 +1,130 @@
+"""The room about the arm: materials, light, floor, table, the Kinect on its mast, and the cameras for pictures."""
+
+import mujoco
+import numpy as np
+
+from weldsim.mounts import KINECT_V2, X_WB, X_WC_KINECT
+from weldsim.scene.config import MaterialConfig
+from weldsim.scene.files import asset_path
+from weldsim.scene.shapes import Spec, box, camera, look_at, rod
+
+TABLE_TOP = 0.75  # [m] above the floor; B's z = 0
+
+MATERIALS: dict[str, tuple[tuple[float, float, float], float, float]] = {
+    # name: colour, specular, shininess
+    "table": ((0.30, 0.31, 0.33), 0.25, 0.35),
+    "frame": ((0.20, 0.21, 0.23), 0.2, 0.3),
+    "profile": ((0.70, 0.72, 0.74), 0.5, 0.6),
+    "steel": ((0.52, 0.53, 0.55), 0.6, 0.6),
+    "clamp": ((0.24, 0.25, 0.27), 0.4, 0.5),
+    "zinc": ((0.72, 0.71, 0.66), 0.7, 0.7),
+    "wedge": ((0.40, 0.33, 0.24), 0.1, 0.1),
+    "brass": ((0.72, 0.55, 0.30), 0.7, 0.7),
+    "copper": ((0.76, 0.45, 0.30), 0.7, 0.7),
+    "rubber": ((0.10, 0.10, 0.11), 0.2, 0.2),
+    "bracket": ((0.15, 0.16, 0.19), 0.15, 0.2),
+    "d415_aluminium": ((0.74, 0.75, 0.77), 0.6, 0.6),
+    "glass": ((0.04, 0.04, 0.06), 0.9, 0.9),
+    "lens": ((0.16, 0.14, 0.24), 0.9, 0.9),
+    "kinect": ((0.09, 0.09, 0.10), 0.3, 0.4),
+    "collision": ((0.9, 0.4, 0.2), 0.0, 0.0),
+}
+
+
+def new_cell(material: MaterialConfig) -> Spec:
+    """A model of the room with the bare arm on its table, expressed in W: everything but tool and part."""
+    # The arm's file is the root rather than attached: attaching without a prefix to its names is warned about.
+    spec = mujoco.MjSpec.from_file(str(asset_path("ur5", "ur5.xml")))
+    spec.modelname = "weldsim"
+    base = spec.body("ur5_base")
+    base.pos, base.quat = X_WB.p, X_WB.quaternion
+    spec.option.timestep = 0.002
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.stat.center, spec.stat.extent = [0.0, 0.3, 0.9], 1.6
+    spec.visual.map.znear, spec.visual.map.zfar = 0.005, 30.0
+    visual = spec.visual.global_
+    visual.offwidth, visual.offheight = 1920, 1440
+    spec.visual.quality.shadowsize = 4096
+    spec.visual.headlight.ambient = [0.28, 0.28, 0.30]
+    spec.visual.headlight.diffuse = [0.22, 0.22, 0.22]
+    spec.visual.headlight.specular = [0.05, 0.05, 0.05]
+    _add_materials(spec, material)
+    _add_lights(spec)
+    _add_table(spec)
+    _add_kinect(spec)
+    look_at(spec.worldbody, "overview", (1.55, 1.45, 1.75), (-0.02, 0.26, 0.93), 38)
+    look_at(spec.worldbody, "closeup", (0.55, 0.98, 1.18), (0.0, 0.46, 0.82), 36)
+    return spec
+
+
+def _add_materials(spec: Spec, part: MaterialConfig) -> None:
+    for name, (rgb, specular, shininess) in MATERIALS.items():
+        spec.add_material(name=name, rgba=[*rgb, 1.0], specular=specular, shininess=shininess)
+    gloss = {"matte": (0.05, 0.05), "mill_scale": (0.25, 0.3), "ground": (0.7, 0.7), "black": (0.2, 0.3)}[part.finish]
+    shade = 0.12 if part.finish == "black" else 1.0
+    rgb = np.array([part.red, part.green, part.blue]) * shade
+    spec.add_material(name="part", rgba=[*rgb, 1.0], specular=gloss[0], shininess=gloss[1])
+    spec.add_material(name="groove", rgba=[*(rgb * 0.92), 1.0], specular=gloss[0], shininess=gloss[1])
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.80, 0.84, 0.88],
+        rgb2=[0.42, 0.46, 0.52],
+        width=256,
+        height=256,
+    )
+    spec.add_texture(
+        name="floor",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        mark=mujoco.mjtMark.mjMARK_EDGE,
+        rgb1=[0.56, 0.57, 0.58],
+        rgb2=[0.53, 0.54, 0.55],
+        markrgb=[0.48, 0.49, 0.50],
+        width=300,
+        height=300,
+    )
+    floor = spec.add_material(name="floor", texrepeat=[1.5, 1.5], texuniform=True, reflectance=0.04, specular=0.1, shininess=0.2)
+    floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
+
+
+def _add_lights(spec: Spec) -> None:
+    directional = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    for name, pos, direction, brightness, shadow in (
+        ("key", (1.2, 1.6, 3.0), (-0.45, -0.55, -1.1), 0.50, True),
+        ("fill", (-1.6, 0.8, 2.6), (0.7, -0.2, -1.0), 0.22, False),
+        ("back", (0.0, -1.5, 2.5), (0.0, 0.8, -0.9), 0.15, False),
+    ):
+        light = spec.worldbody.add_light(name=name, pos=pos, dir=direction, type=directional, castshadow=shadow)
+        light.diffuse, light.specular, light.ambient = [brightness] * 3, [brightness * 0.5] * 3, [0.0] * 3
+
+
+def _add_table(spec: Spec) -> None:
+    """A welding table, its top at B's z = 0, and the floor."""
+    world = spec.worldbody
+    floor = world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[4.0, 4.0, 0.1], contype=1, conaffinity=1)
+    floor.material = "floor"
+    middle, half = np.array([0.0, 0.32, TABLE_TOP - 0.02]), np.array([0.60, 0.52, 0.02])
+    box(world, "table", middle, half, "table", collide=True)
+    for i, (sx, sy) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
+        x, y = middle[0] + sx * (half[0] - 0.05), middle[1] + sy * (half[1] - 0.05)
+        box(world, f"table_leg_{i}", (x, y, (TABLE_TOP - 0.04) / 2), (0.035, 0.035, (TABLE_TOP - 0.04) / 2), "frame")
+    for i, y in enumerate((middle[1] - half[1] + 0.05, middle[1] + half[1] - 0.05)):
+        box(world, f"table_rail_{i}", (0.0, y, 0.20), (half[0] - 0.05, 0.02, 0.03), "frame")
+
+
+def _add_kinect(spec: Spec) -> None:
+    """The Kinect v2, 249 x 66 x 67 mm, under a beam whose mast stands behind the table."""
+    world, eye = spec.worldbody, X_WC_KINECT.p
+    top = eye[2] + 0.10
+    mast_y = 0.95
+    box(world, "kinect_mast", (eye[0], mast_y, top / 2), (0.0225, 0.0225, top / 2), "profile")
+    box(world, "kinect_foot", (eye[0], mast_y, 0.01), (0.20, 0.14, 0.01), "frame")
+    box(world, "kinect_beam", (eye[0], (mast_y + eye[1]) / 2, top), (0.0225, (mast_y - eye[1]) / 2 + 0.0225, 0.0225), "profile")
+    # The depth lens is not in the middle of the housing: 6 cm or so to one side of it.
+    box(world, "kinect_housing", (eye[0] + 0.06, eye[1], eye[2] + 0.0345), (0.1245, 0.033, 0.0335), "kinect")
+    for i, (dx, radius) in enumerate(((0.0, 0.010), (-0.03, 0.007), (0.06, 0.012))):
+        rod(world, f"kinect_lens_{i}", (eye[0] + dx, eye[1], eye[2] + 0.001), (eye[0] + dx, eye[1], eye[2] + 0.0015), radius, "lens")
+    camera(world, "kinect", X_WC_KINECT, KINECT_V2)
+

@@ -1,0 +1,55 @@
+"""Where scenes and assets lie: at the top of a checkout, or inside the installed package."""
+
+from pathlib import Path
+
+from weldsim.errors import SceneError
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def _data_folder(name: str) -> Path:
+    """The folder `name` of the wheel (weldsim/_data) if it is there, else of the checkout."""
+    packed = _PACKAGE / "_data" / name
+    return packed if packed.is_dir() else _PACKAGE.parent / name
+
+
+def scenes_folder() -> Path:
+    """Folder of the scene files that come with weldsim."""
+    return _data_folder("scenes")
+
+
+def scene_names() -> tuple[str, ...]:
+    """Names of the scenes that come with weldsim, sorted."""
+    return tuple(sorted(path.stem for path in scenes_folder().glob("*.toml")))
+
+
+def scene_path(name: str | Path) -> Path:
+    """The TOML file of a known scene, or of a path to the user's own.
+
+    Raises:
+        SceneError: neither a known name nor a file.
+    """
+    path = Path(name)
+    if path.suffix == ".toml":
+        if path.is_file():
+            return path
+        raise SceneError(f"scene {str(name)!r}: no such file", scene=str(name), allowed=scene_names())
+    if str(name) in scene_names():
+        return scenes_folder() / f"{name}.toml"
+    raise SceneError(
+        f"scene {str(name)!r} is unknown; known are {', '.join(scene_names())}, or give a path ending in .toml",
+        scene=str(name),
+        allowed=scene_names(),
+    )
+
+
+def asset_path(*parts: str) -> Path:
+    """A file of the assets folder, say asset_path("ur5", "ur5.xml").
+
+    Raises:
+        SceneError: it is not there (a broken installation).
+    """
+    path = _data_folder("assets").joinpath(*parts)
+    if not path.exists():
+        raise SceneError(f"asset {'/'.join(parts)}: not found in {_data_folder('assets')}; reinstall weldsim", asset="/".join(parts))
+    return path

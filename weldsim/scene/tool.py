@@ -1,0 +1,88 @@
+"""What hangs on the flange: the torch, the wrist camera and its printed bracket, dimensioned about the mounts."""
+
+import numpy as np
+
+from weldsim.frames import Transform
+from weldsim.mounts import D415_640X480, X_FC, X_FT
+from weldsim.records import CameraIntrinsics
+from weldsim.scene.shapes import Body, Group, box, camera, rod
+
+STICK_OUT = 0.015  # [m] wire beyond the contact tip
+TOOL_MASS = 1.2  # [kg] torch, bracket and camera: an assumption, of the size of common light torches
+GRAVITY_COMPENSATION = 1.0  # share of the tool's weight that the controller knows of (its payload setting)
+
+
+def add_tool(flange: Body, intrinsics: CameraIntrinsics = D415_640X480) -> None:
+    """Add torch, bracket, D415, the sites and the camera to the flange's body, whose frame is F."""
+    tool = flange.add_body(name="tool", gravcomp=GRAVITY_COMPENSATION)
+    tool.mass, tool.ipos = TOOL_MASS, [0.0, -0.02, 0.08]
+    tool.inertia = [0.0055, 0.0045, 0.0035]
+    tool.explicitinertial = True
+    _add_torch(tool)
+    _add_camera(tool, intrinsics)
+
+
+def _add_torch(tool: Body) -> None:
+    """Nozzle about the wire, a neck that bends away from it, and a clamp on the flange: as on a common air-cooled torch."""
+    tip, wire = X_FT.p, X_FT.R[:, 2]
+
+    def along(distance: float) -> np.ndarray:
+        """The point of the wire's axis `distance` [m] behind the tip."""
+        return tip - distance * wire
+
+    robot = {"group": Group.ROBOT}
+    rod(tool, "wire", tip, along(STICK_OUT), 0.0006, "copper", **robot)
+    rod(tool, "contact_tip", along(STICK_OUT), along(STICK_OUT + 0.006), 0.004, "copper", **robot)
+    rod(tool, "nozzle_mouth", along(STICK_OUT + 0.001), along(0.045), 0.0085, "brass", **robot)
+    rod(tool, "nozzle", along(0.030), along(0.085), 0.0105, "brass", **robot)
+    rod(tool, "insulator", along(0.083), along(0.093), 0.0120, "rubber", **robot)
+    bend = [along(0.090), along(0.112), np.array([0.0, -0.0330, 0.128]), np.array([0.0, -0.030, 0.105]), np.array([0.0, -0.026, 0.085])]
+    for i, (a, b) in enumerate(zip(bend[:-1], bend[1:], strict=True)):
+        rod(tool, f"neck_{i}", a, b, 0.0085, "steel", round_ends=True, **robot)
+    rod(tool, "torch_body", (0.0, -0.026, 0.090), (0.0, -0.020, 0.030), 0.017, "rubber", **robot)
+    box(tool, "torch_clamp", (0.0, -0.020, 0.040), (0.026, 0.024, 0.012), "steel", **robot)
+    rod(tool, "tool_plate", (0.0, 0.0, 0.0), (0.0, 0.0, 0.012), 0.0375, "ur_aluminium", **robot)
+    box(tool, "torch_post", (0.0, -0.008, 0.021), (0.022, 0.020, 0.010), "steel", **robot)
+    for name, a, b, radius in (
+        ("nozzle_collision", along(STICK_OUT + 0.011), along(0.093), 0.011),
+        ("neck_collision", along(0.090), (0.0, -0.026, 0.085), 0.014),
+        ("torch_collision", (0.0, -0.024, 0.085), (0.0, -0.018, 0.025), 0.024),
+    ):
+        rod(tool, name, a, b, radius, "collision", group=Group.COLLISION, collide=True, round_ends=True)
+    tool.add_site(name="torch_tip", pos=X_FT.p, quat=X_FT.quaternion, size=[0.002, 0.002, 0.002], group=4)
+
+
+def _add_camera(tool: Body, intrinsics: CameraIntrinsics) -> None:
+    """The D415's housing, 99 x 20 x 23 mm, its front just behind the optical centre; the bracket carries it from the flange."""
+    robot = {"group": Group.ROBOT}
+
+    def at(x: float, y: float, z: float) -> np.ndarray:
+        return X_FC.points(np.array([[x, y, z]]))[0]
+
+    # The left imager is the optical centre; it sits 20 mm from the middle of the housing, which reaches further to image right.
+    box(tool, "d415_housing", at(0.020, 0.0, -0.0115), (0.0400, 0.0115, 0.0100), "d415_aluminium", **robot)
+    for i, x in enumerate((-0.020, 0.060)):
+        rod(tool, f"d415_end_{i}", at(x, 0, -0.0215), at(x, 0, -0.0015), 0.0115, "d415_aluminium", **robot)
+    box(tool, "d415_window", at(0.020, 0.0, -0.0014), (0.0440, 0.0085, 0.0002), "glass", **robot)
+    for i, (x, radius) in enumerate(((-0.0175, 0.0035), (0.0, 0.0042), (0.030, 0.0030), (0.055, 0.0042))):
+        rod(tool, f"d415_lens_{i}", at(x, 0, -0.0013), at(x, 0, -0.0010), radius, "lens", **robot)
+    box(tool, "d415_back", at(0.020, 0.0, -0.0235), (0.024, 0.009, 0.002), "bracket", **robot)
+    _bracket(tool, np.array([0.0, -0.030, 0.006]), at(0.020, 0.0, -0.024))
+    box(tool, "d415_collision", at(0.020, 0.0, -0.0125), (0.0515, 0.0135, 0.0115), "collision", group=Group.COLLISION, collide=True)
+    camera(tool, "d415", X_FC, intrinsics)
+
+
+def _bracket(tool: Body, start: np.ndarray, end: np.ndarray) -> None:
+    """A printed arm: a plate on the flange, out to under the camera, and a post up to its back."""
+    foot = np.array([end[0], end[1], start[2]])
+    arm = Transform.identity("FF")
+    middle, span = (start + foot) / 2, foot - start
+    length = float(np.linalg.norm(span))
+    arm = Transform("FF", np.column_stack([span / length, np.cross([0, 0, 1.0], span / length), [0, 0, 1.0]]), middle)
+    robot = {"group": Group.ROBOT}
+    geom = box(tool, "bracket_arm", arm.p, (length / 2 + 0.008, 0.016, 0.004), "bracket", **robot)
+    geom.quat = arm.quaternion
+    box(tool, "bracket_post", (foot + end) / 2, (0.016, 0.004, float(end[2] - foot[2]) / 2 + 0.002), "bracket", **robot)
+    geom = box(tool, "bracket_collision", arm.p, (length / 2, 0.016, 0.005), "collision", group=Group.COLLISION, collide=True)
+    geom.quat = arm.quaternion
+

@@ -1,0 +1,139 @@
+"""The compiled cell: arm, torch, cameras, table and part in one MuJoCo model, with what is known of the part."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from weldsim.frames import Transform
+from weldsim.kinematics import JOINT_NAMES, inverse
+from weldsim.mounts import D415_640X480, X_FC, X_WB
+from weldsim.records import CameraIntrinsics, KnownSeam
+from weldsim.scene.cell import new_cell
+from weldsim.scene.config import SceneConfig, make_workpiece, part_pose
+from weldsim.scene.fixture import add_clamps, add_wedge
+from weldsim.scene.mesh_cache import cached_mesh
+from weldsim.scene.shapes import Group, box, mesh_geom
+from weldsim.scene.tool import add_tool
+from weldsim.scene.workpieces.base import Workpiece
+
+Label = Literal["groove", "part", "clamp", "table", "robot", "room"]
+
+HOME = np.array([-1.5708, -1.7453, -1.9199, -1.0472, 1.5708, 0.0])  # [rad] arm up and folded over the table, camera down
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class World:
+    """A scene, compiled. The model is MuJoCo's and can be changed by its users; everything else cannot.
+
+    Attributes:
+        config: what it was built from.
+        model: the compiled model; its world frame is W. Sites "flange" and "torch_tip", cameras "d415", "kinect",
+            "overview" and "closeup", joints and actuators named as in `weldsim.kinematics.JOINT_NAMES`.
+        workpiece: the part.  X_BP: its pose in the base.  X_WB: the base in the world.
+        known_seams: its true seams in the base, for `report` and tests alone.
+        views: X_BC of each scan view, in order.
+        intrinsics: of the wrist camera.
+        labels: {geom id: what it belongs to}, for every geom.
+        qpos, dof, actuators: (6,) indices of the arm's joints in qpos, in qvel, and of its servos in ctrl.
+    """
+
+    config: SceneConfig
+    model: Any
+    workpiece: Workpiece
+    X_BP: Transform
+    X_WB: Transform
+    known_seams: tuple[KnownSeam, ...]
+    views: tuple[Transform, ...]
+    intrinsics: CameraIntrinsics
+    labels: dict[int, Label]
+    qpos: Int[ndarray, "6"]
+    dof: Int[ndarray, "6"]
+    actuators: Int[ndarray, "6"]
+
+    def new_data(self, q: Float[ndarray, "6"] = HOME) -> Any:
+        """A fresh simulation state with the arm at rest at q [rad], servos holding it there."""
+        data = mujoco.MjData(self.model)
+        data.qpos[self.qpos] = q
+        data.ctrl[self.actuators] = q
+        mujoco.mj_forward(self.model, data)
+        return data
+
+    def site_pose(self, data: Any, site: str = "torch_tip") -> Transform:
+        """X_BT of the torch tip, or X_BF with site="flange", as the simulation has it now."""
+        names = {"torch_tip": "WT", "flange": "WF"}[site]
+        found = data.site(site)
+        return self.X_WB.inverse() @ Transform(names, found.xmat.reshape(3, 3), found.xpos)
+
+    def geoms(self, label: Label) -> Int[ndarray, "k"]:
+        """Ids of the geoms with this label."""
+        return np.array([geom for geom, found in self.labels.items() if found == label], dtype=np.int64)
+
+    def view_solutions(self, view: int = 0) -> Float[ndarray, "k 6"]:
+        """All joint solutions [rad] that put the wrist camera at the view; empty when it is out of reach."""
+        return inverse(self.views[view] @ X_FC.inverse())
+
+
+def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480) -> World:
+    """The compiled scene.
+
+    Args:
+        config: the scene.
+        intrinsics: of the wrist camera's depth image.
+    Raises:
+        SceneError: a scene that contradicts itself.
+    """
+    workpiece = make_workpiece(config)
+    X_BP = part_pose(config.pose, workpiece)
+    spec = new_cell(config.material)
+    add_tool(spec.body("wrist_3_link"), intrinsics)
+    _add_part(spec, config, workpiece, X_BP)
+    model = spec.compile()
+    joints = [model.joint(name) for name in JOINT_NAMES]
+    return World(
+        config=config,
+        model=model,
+        workpiece=workpiece,
+        X_BP=X_BP,
+        X_WB=X_WB,
+        known_seams=workpiece.known_seams(X_BP),
+        views=tuple(X_BP @ view.pose_in_part() for view in config.views),
+        intrinsics=intrinsics,
+        labels={i: _label(model, i) for i in range(model.ngeom)},
+        qpos=np.array([joint.qposadr[0] for joint in joints]),
+        dof=np.array([joint.dofadr[0] for joint in joints]),
+        actuators=np.array([model.actuator(name).id for name in JOINT_NAMES]),
+    )
+
+
+def _add_part(spec: Any, config: SceneConfig, workpiece: Workpiece, X_BP: Transform) -> None:
+    """The part as two visual meshes, groove and the rest, boxes to collide with, and what holds it."""
+    base = spec.worldbody.add_body(name="fixture", pos=X_WB.p, quat=X_WB.quaternion)
+    part = base.add_body(name="part", pos=X_BP.p, quat=X_BP.quaternion)
+    mesh = cached_mesh(workpiece)
+    mesh_geom(spec, part, "part", *mesh.part(groove=False), "part", group=Group.WORKPIECE)
+    if mesh.groove.any():
+        mesh_geom(spec, part, "groove", *mesh.part(groove=True), "groove", group=Group.WORKPIECE)
+    for i, block in enumerate(workpiece.collision_boxes()):
+        geom = box(part, f"part_collision_{i}", block.centre, block.half, "collision", group=Group.COLLISION, collide=True)
+        geom.quat = Transform("PS", block.R, block.centre).quaternion
+    add_clamps(part, config.fixture, config.plate)
+    add_wedge(spec, base, X_BP, workpiece.base_corners)
+
+
+def _label(model: Any, geom: int) -> Label:
+    """What a geom belongs to, by its body and name."""
+    name = model.geom(geom).name
+    root = model.body(model.body_rootid[model.geom_bodyid[geom]]).name
+    if root == "ur5_base":
+        return "robot"
+    if name == "groove":
+        return "groove"
+    if name.startswith("part"):
+        return "part"
+    if name.startswith(("clamp", "wedge")):
+        return "clamp"
+    return "table" if name == "table" else "room"
