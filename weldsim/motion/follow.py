@@ -131,17 +131,19 @@ def _follow_piece(
     q = np.empty((len(s), 6))
     for i in range(len(s)):
         q[i] = solver.at(X_BT[i], q[i - 1] if i else q_first, float(s[i]))
-    for halving in range(HALVINGS + 1):
+    halvings = 0
+    while True:
         _refuse_flips(s, q, config)
         spline = CubicSpline(s, q)
         coarse, distance, angle = _strayed(rail, spline, s, X_FT, config)
         if len(coarse) == 0:
-            break
+            return JointPath(segment=segment, spline=spline, position_error=distance, axis_error=angle, solved=len(s))
         middle = (s[coarse] + s[coarse + 1]) / 2
-        if halving == HALVINGS:
+        if (halvings := halvings + 1) > HALVINGS:
             raise LostPathError(
-                f"s = {1e3 * middle[0]:.1f} mm: the joint spline stays {1e3 * distance:.3f} mm and {np.rad2deg(angle):.3f} deg off the"
-                f" path (limits {1e3 * config.spline_tolerance:.3f} mm, {np.rad2deg(config.axis_tolerance):.3f} deg); smooth the path",
+                f"s = {1e3 * middle[0]:.1f} mm: the joint spline stays {1e3 * distance:.3f} mm and {np.rad2deg(angle):.3f} deg"
+                f" off the path (limits {1e3 * config.spline_tolerance:.3f} mm, {np.rad2deg(config.axis_tolerance):.3f} deg);"
+                " smooth the path",
                 s=float(middle[0]),
                 reason="rough path",
             )
@@ -149,7 +151,6 @@ def _follow_piece(
         extra = np.stack([solver.at(X_BT[k], spline(middle[k]), float(middle[k])) for k in range(len(middle))])
         order = np.argsort(np.concatenate([s, middle]))
         s, q = np.concatenate([s, middle])[order], np.concatenate([q, extra])[order]
-    return JointPath(segment=segment, spline=spline, position_error=distance, axis_error=angle, solved=len(s))
 
 
 def _strayed(
