@@ -1,0 +1,255 @@
+"""Recorded depth frames: a 16-bit PNG or an NPY, its intrinsics in a text file, and the camera's pose.
+
+Intrinsics are width, height, fx, fy, cx, cy (or ppx, ppy), or a 3x3 `K` with width and height, as JSON, TOML or
+`key: value` lines, in the convention of OpenCV, ROS and librealsense: the centre of the first pixel is (0, 0).
+A `depth_scale` there [m per count] outranks the caller's. A pose is JSON: `position` [m] and `quaternion_wxyz`, or a 4x4
+`matrix`, of the optical frame in the robot base.
+"""
+
+import json
+import tomllib
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float32
+from numpy import ndarray
+
+from weldsim.cloud.arrays import read_npy, read_npz
+from weldsim.cloud.raw import Unreadable
+from weldsim.cloud.sources import read_bytes
+from weldsim.errors import CloudFileError, RecordError, WeldsimError
+from weldsim.frames import Transform
+from weldsim.output import write_whole
+from weldsim.records import CameraIntrinsics, DepthFrame
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_MAX_SIDE = 16_384  # [px]
+_MAX_DEPTH = 100.0  # [m] a median beyond it was surely written in millimetres
+
+
+def read_depth_frame(
+    path: str | Path, intrinsics_path: str | Path, *, pose: str | Path | Transform | None = None, depth_unit: float = 1e-3
+) -> DepthFrame:
+    """The depth frame in a 16-bit PNG, or in an NPY or NPZ (whole numbers as in the PNG, floats in metres).
+
+    Args:
+        path: the image; 0, the largest whole number, negative and non-finite values mean no return.
+        intrinsics_path: see the module's docstring.
+        pose: X_BC, or a file that holds it; None puts the robot base where the camera is.
+        depth_unit: metres per count of a whole number.
+    Raises:
+        CloudFileError: a file is missing, damaged, of another size than the intrinsics say, or holds no depth.
+    """
+    table = _table(intrinsics_path)
+    try:
+        intrinsics, unit = _intrinsics(table), _scale(table, depth_unit)
+    except (Unreadable, RecordError) as error:
+        raise CloudFileError(f"{intrinsics_path}: {error}", path=str(intrinsics_path), reason=str(error)) from None
+    X_BC = pose if isinstance(pose, Transform) else Transform.identity("BC") if pose is None else read_pose(pose)
+    data = read_bytes(path)
+    try:
+        depth = _metres(_image(data, (intrinsics.height, intrinsics.width)), unit)
+    except Unreadable as error:
+        raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
+    return DepthFrame(depth=depth, intrinsics=intrinsics, X_BC=X_BC, source=Path(path).name)
+
+
+def read_pose(path: str | Path) -> Transform:
+    """X_BC from a JSON file. Raises CloudFileError."""
+    table = _table(path)
+    try:
+        if "position" in table:
+            quaternion, p = _numbers(table, "quaternion_wxyz", (4,)), _numbers(table, "position", (3,))
+            if abs(np.linalg.norm(quaternion) - 1.0) > 0.01:
+                raise Unreadable(f"its quaternion_wxyz has length {np.linalg.norm(quaternion):.3g}, not 1")
+            return Transform.from_quaternion("BC", quaternion, p)
+        matrix = _numbers(table, "matrix", (4, 4))
+        u, _, vt = np.linalg.svd(matrix[:3, :3])
+        if np.abs(u @ vt - matrix[:3, :3]).max() > 1e-3 or np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
+            raise Unreadable("its matrix is no rigid transform")
+        return Transform("BC", u @ vt, matrix[:3, 3])  # printed digits are no exact rotation
+    except (Unreadable, WeldsimError) as error:
+        raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
+
+
+def write_depth_png(path: str | Path, depth: Float32[ndarray, "h w"], *, depth_unit: float = 1e-3) -> Path:
+    """Where the 16-bit PNG now lies; NaN is written as 0. Raises OutputError, RecordError (depth beyond 16 bits)."""
+    import cv2
+
+    counts = np.round(np.nan_to_num(depth.astype(float) / depth_unit))
+    if counts.min() < 0 or counts.max() >= 65_535:
+        raise RecordError(f"depth up to {counts.max() * depth_unit:.3g} m does not fit 16 bits of {depth_unit:g} m", field="depth")
+    _, png = cv2.imencode(".png", counts.astype(np.uint16))
+    return write_whole(path, png.tobytes())
+
+
+# Text ---------------------------------------------------------------------------------------------------------------
+
+
+def _table(path: str | Path) -> dict[str, Any]:
+    """The keys of a JSON, TOML or `key: value` file; a bare JSON list is a 4x4 matrix. Raises CloudFileError."""
+    data = read_bytes(path)
+    try:
+        text = data[: 1 << 20].decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise CloudFileError(f"{path}: is no text", path=str(path), reason="not UTF-8") from None
+    for parse in (json.loads, tomllib.loads, _lines):
+        try:
+            parsed = parse(text)
+        except (ValueError, RecursionError):
+            continue
+        if isinstance(parsed, dict) and parsed:
+            return parsed
+        if isinstance(parsed, list):
+            return {"matrix": parsed}
+    raise CloudFileError(f"{path}: is neither JSON nor TOML nor lines of `key: value`", path=str(path), reason="no table")
+
+
+def _lines(text: str) -> dict[str, Any]:
+    """The keys of `key: value` lines; values are JSON, other lines are passed over."""
+    found: dict[str, Any] = {}
+    for line in text.splitlines():
+        key, colon, value = line.partition(":")
+        try:
+            found[key.strip()] = json.loads(value) if colon else None
+        except (ValueError, RecursionError):
+            continue
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def _numbers(table: dict[str, Any], key: str, shape: tuple[int, ...]) -> Float[ndarray, "..."]:
+    """The finite numbers under `key`, in `shape`. Raises Unreadable."""
+    if key not in table:
+        raise Unreadable(f"key {key!r} is missing (found: {', '.join(map(str, table))[:80]})")
+    try:
+        array = np.asarray(table[key], dtype=float)
+    except (ValueError, TypeError, OverflowError):
+        raise Unreadable(f"{key}: {str(table[key])[:40]!r} is no number") from None
+    if array.size != int(np.prod(shape)) or not np.isfinite(array).all():
+        raise Unreadable(f"{key}: {str(table[key])[:40]!r}, expected {int(np.prod(shape))} finite numbers")
+    return array.reshape(shape)
+
+
+def _intrinsics(table: dict[str, Any]) -> CameraIntrinsics:
+    for key in ("D", "coeffs", "distortion", "distortion_coefficients"):
+        if key in table and np.any(np.asarray(table[key], dtype=object) != 0):
+            raise Unreadable(f"{key} is not zero: give a depth image without distortion")
+    if "K" in table:
+        K = _numbers(table, "K", (3, 3))
+        if K[0, 1] != 0 or K[1, 0] != 0 or (K[2] != [0, 0, 1]).any():
+            raise Unreadable("K is no matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
+        fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    else:
+        names = ("fx", "fy", "ppx" if "ppx" in table else "cx", "ppy" if "ppy" in table else "cy")
+        fx, fy, cx, cy = (_numbers(table, name, ())[()] for name in names)
+    sides = [float(_numbers(table, name, ())) for name in ("width", "height")]
+    if any(side != round(side) or not 1 <= side <= _MAX_SIDE for side in sides):
+        raise Unreadable(f"width {sides[0]:g} and height {sides[1]:g} are no image size (1 to {_MAX_SIDE} px)")
+    return CameraIntrinsics.from_opencv(
+        width=int(sides[0]), height=int(sides[1]), fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy)
+    )
+
+
+def _scale(table: dict[str, Any], depth_unit: float) -> float:
+    unit = float(_numbers(table, "depth_scale", ())) if "depth_scale" in table else depth_unit
+    if not 1e-9 < unit < 1.0:
+        raise Unreadable(f"depth_scale {unit:g} m per count is not between 1e-9 and 1")
+    return unit
+
+
+# Images -------------------------------------------------------------------------------------------------------------
+
+
+def _image(data: bytes, shape: tuple[int, int]) -> ndarray:
+    """The image (h, w) in `data`, uint16 or float. Raises Unreadable."""
+    if data[:8] == _SIGNATURE:
+        return _png(data, shape)
+    if data[:6] == b"\x93NUMPY":
+        image = read_npy(data)
+    elif data[:2] == b"PK":
+        arrays = read_npz(data)
+        if "depth" not in arrays:
+            raise Unreadable(f"it has no array called depth (found: {', '.join(arrays)[:80] or 'none'})")
+        image = arrays["depth"]()
+    else:
+        raise Unreadable("it is neither a PNG nor an NPY nor an NPZ")
+    image = image[..., 0] if image.ndim == 3 and image.shape[-1] == 1 else image
+    _check_size(image.shape, shape)
+    if image.dtype.kind not in "fiu" or image.dtype.itemsize == 1:
+        raise Unreadable(f"its type is {image.dtype}; depth is uint16 or float")
+    return image
+
+
+def _check_size(found: tuple[int, ...], expected: tuple[int, int]) -> None:
+    if found != expected:
+        shown = " x ".join(map(str, found[::-1]))
+        raise Unreadable(f"the image is {shown} px, its intrinsics are for {expected[1]} x {expected[0]}")
+
+
+def _png(data: bytes, shape: tuple[int, int]) -> ndarray:
+    """A 16-bit single-channel PNG. Every part is checked first: the decoder writes to stderr what it does not like."""
+    import cv2
+
+    header, packed = b"", []
+    at = 8
+    while at + 12 <= len(data):
+        size, kind = int.from_bytes(data[at : at + 4]), data[at + 4 : at + 8]
+        body = data[at + 8 : at + 8 + size]
+        if at + 12 + size > len(data) or zlib.crc32(kind + body) != int.from_bytes(data[at + 8 + size : at + 12 + size]):
+            raise Unreadable("its PNG data is cut off or damaged")
+        header = body if kind == b"IHDR" and not header else header
+        packed += [body] if kind == b"IDAT" else []
+        at += 12 + size
+        if kind == b"IEND":
+            break
+    else:
+        raise Unreadable("its PNG data is cut off")
+    if len(header) != 13:
+        raise Unreadable("its PNG header is missing")
+    width, height = int.from_bytes(header[:4]), int.from_bytes(header[4:8])
+    bits, colour, interlaced = header[8], header[9], header[12]
+    if bits != 16 or colour != 0 or any(header[10:12]):
+        kinds = {0: "grey", 2: "RGB", 3: "palette", 4: "grey + alpha", 6: "RGBA"}
+        raise Unreadable(f"it is a {bits}-bit {kinds.get(colour, 'unknown')} PNG; depth is one channel of 16 bits")
+    if interlaced:
+        raise Unreadable("it is an interlaced PNG; save it without")
+    _check_size((height, width), shape)
+    rows = height * (1 + 2 * width)
+    try:
+        unpacker = zlib.decompressobj()
+        pixels = unpacker.decompress(b"".join(packed), rows + 1)
+    except zlib.error as error:
+        raise Unreadable(f"its PNG data is damaged ({error})") from None
+    if len(pixels) != rows or max(pixels[:: 1 + 2 * width]) > 4:
+        raise Unreadable("its PNG data is damaged")
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return len(body).to_bytes(4) + kind + body + zlib.crc32(kind + body).to_bytes(4)
+
+    plain = _SIGNATURE + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(pixels, 0)) + chunk(b"IEND", b"")
+    image = cv2.imdecode(np.frombuffer(plain, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None or image.dtype != np.uint16 or image.shape != shape:
+        raise Unreadable("its PNG data cannot be decoded")
+    return image
+
+
+def _metres(image: ndarray, unit: float) -> Float32[ndarray, "h w"]:
+    """Depth [m], NaN where there is none. Raises Unreadable when nowhere is any, or when it looks like millimetres."""
+    with np.errstate(all="ignore"):
+        depth = image.astype(np.float64)
+        if image.dtype.kind in "iu":
+            depth[image == np.iinfo(image.dtype).max] = np.nan
+            depth *= unit
+        depth[~(np.isfinite(depth) & (depth > 0) & (depth < 1e6))] = np.nan
+        depth = depth.astype(np.float32)
+        depth[depth == 0] = np.nan  # smaller than float32 holds
+    seen = depth[np.isfinite(depth)]
+    if not seen.size:
+        raise Unreadable("no pixel of it has a depth")
+    median = float(np.median(seen))
+    if median > _MAX_DEPTH:
+        advice = "floats are metres: divide millimetres by 1000" if image.dtype.kind == "f" else "check depth_scale"
+        raise Unreadable(f"its median depth is {median:.4g} m (limit {_MAX_DEPTH:g}); {advice}")
+    return depth

@@ -1,0 +1,148 @@
+"""PLY clouds, ASCII or binary of either byte order: the vertices; faces and other elements are passed over.
+
+Own reader because the counts of a header must be checked against the file before anything is allocated.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.cloud.raw import RawCloud, Unreadable, check_count, from_columns
+from weldsim.cloud.table import parse_table
+
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
+    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
+    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+_MAX_HEADER = 65_536
+
+
+@dataclass
+class _Element:
+    """One element of the header: its properties as (name, type) or, for lists, (name, count type, item type)."""
+
+    name: str
+    count: int
+    properties: list[tuple[str, ...]] = field(default_factory=list)
+
+    @property
+    def has_list(self) -> bool:
+        return any(len(entry) == 3 for entry in self.properties)
+
+    def least_size(self, ascii_: bool) -> int:
+        """The fewest bytes one row can take."""
+        return sum(2 if ascii_ else np.dtype(entry[1]).itemsize for entry in self.properties)
+
+
+def read_ply(data: bytes) -> RawCloud:
+    """The vertices of the PLY file `data`. Raises Unreadable."""
+    order, elements, viewpoints, start = _header(data)
+    left = len(data) - start
+    for element in elements:
+        promised = element.count * element.least_size(order == "ascii")
+        if element.count < 0 or promised > left + 1:  # the last line of text may lack its newline
+            raise Unreadable(
+                f"its header promises {element.count} x {element.name}, at least {promised} bytes, but {left} follow: cut off?"
+            )
+    names = [element.name for element in elements]
+    if "vertex" not in names:
+        raise Unreadable(f"its header has no vertex element ({', '.join(names) or 'none at all'})")
+    before, vertex = elements[: names.index("vertex")], elements[names.index("vertex")]
+    check_count(vertex.count)
+    if vertex.has_list:
+        raise Unreadable("its vertices hold a list property, which has no fixed size")
+    labels = [entry[0] for entry in vertex.properties]
+    if len(set(labels)) != len(labels):
+        raise Unreadable("two of its vertex properties have the same name")
+    read = _ascii_columns if order == "ascii" else _binary_columns
+    return from_columns(read(data, start, before, vertex, order), viewpoints=viewpoints)
+
+
+def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | None, int]:
+    """Byte order ("ascii", "<" or ">"), elements, viewpoint from a comment, and where the body starts."""
+    end = data.find(b"end_header", 0, _MAX_HEADER)
+    newline = min((i for i in (data.find(b"\n", end), data.find(b"\r", end)) if i >= 0), default=-1)
+    if end < 0 or newline < 0:
+        raise Unreadable("its PLY header does not end")
+    start = newline + (2 if data[newline : newline + 2] == b"\r\n" else 1)
+    order, elements, viewpoints = "", [], None
+    for line in data[:end].decode("latin1").splitlines()[1:]:
+        match line.split():
+            case ["format", "ascii", _]:
+                order = "ascii"
+            case ["format", "binary_little_endian", _]:
+                order = "<"
+            case ["format", "binary_big_endian", _]:
+                order = ">"
+            case ["element", name, count] if count.isascii() and count.isdigit() and len(count) < 18:
+                elements.append(_Element(name, int(count)))
+            case ["property", "list", count, item, name] if elements and count in _TYPES and item in _TYPES:
+                elements[-1].properties.append((name.lower(), _TYPES[count], _TYPES[item]))
+            case ["property", kind, name] if elements and kind in _TYPES:
+                elements[-1].properties.append((name.lower(), _TYPES[kind]))
+            case ["comment", "viewpoint", *numbers] if len(numbers) == 3:
+                viewpoints = _viewpoint(numbers)
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case _:
+                raise Unreadable(f"its PLY header has the line {line[:60]!r}")
+    if not order:
+        raise Unreadable("its PLY header names no format")
+    return order, elements, viewpoints, start
+
+
+def _viewpoint(numbers: list[str]) -> Float[ndarray, "1 3"] | None:
+    try:
+        return np.array([[float(number) for number in numbers]])
+    except ValueError:
+        return None
+
+
+def _ascii_columns(data: bytes, start: int, before: list[_Element], vertex: _Element, _: str) -> dict[str, ndarray]:
+    for element in before:
+        for _row in range(element.count):
+            start = data.find(b"\n", start) + 1
+            if start == 0:
+                raise Unreadable(f"it ends within its {element.name} elements")
+    table = parse_table(data[start:], columns=len(vertex.properties), rows=vertex.count)
+    return {entry[0]: _typed(table[:, i], entry[1]) for i, entry in enumerate(vertex.properties)}
+
+
+def _typed(column: ndarray, kind: str) -> ndarray:
+    """Whole numbers as integers, so that a colour of 0 to 255 is told from one of 0 to 1."""
+    if kind[0] == "f" or not np.isfinite(column).all():
+        return column
+    return np.clip(column, -(2**31), 2**32).astype(np.int64)
+
+
+def _binary_columns(data: bytes, start: int, before: list[_Element], vertex: _Element, order: str) -> dict[str, ndarray]:
+    for element in before:
+        start = _skip(data, start, element, order)
+    row = np.dtype([(entry[0], order + entry[1]) for entry in vertex.properties])
+    if start + vertex.count * row.itemsize > len(data):
+        held = max(0, len(data) - start) // max(1, row.itemsize)
+        raise Unreadable(f"its header promises {vertex.count} points, the file holds {held}: cut off?")
+    table = np.frombuffer(data, row, vertex.count, start)
+    return {name: table[name] for name in row.names or ()}
+
+
+def _skip(data: bytes, start: int, element: _Element, order: str) -> int:
+    """Where the rows of `element` end."""
+    if not element.has_list:
+        return start + element.count * element.least_size(False)
+    for _ in range(element.count):
+        for entry in element.properties:
+            size = np.dtype(entry[1]).itemsize
+            if len(entry) == 3:
+                if start + size > len(data):
+                    raise Unreadable(f"it ends within its {element.name} elements")
+                items = int(np.frombuffer(data, order + entry[1], 1, start)[0]) if entry[1][0] != "f" else -1
+                if items < 0:
+                    raise Unreadable(f"a list of its {element.name} elements has no count")
+                start += items * np.dtype(entry[2]).itemsize
+            start += size
+    return start

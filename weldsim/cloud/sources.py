@@ -1,0 +1,35 @@
+"""The bytes of an input file, or the reason why there are none."""
+
+from pathlib import Path
+
+from weldsim.errors import CloudFileError
+
+_MAX_BYTES = 4 << 30
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """All bytes of the file, at least one.
+
+    Raises:
+        CloudFileError: missing, a folder or device, empty, over 4 GB, or not ours to read.
+    """
+    where = Path(path)
+
+    def refuse(reason: str) -> CloudFileError:
+        return CloudFileError(f"{path}: {reason}", path=str(path), reason=reason)
+
+    try:
+        if where.is_dir():
+            raise refuse("is a folder, a file is needed")
+        if not where.exists():
+            raise refuse("no such file")
+        if not where.is_file():
+            raise refuse("is no regular file")
+        size = where.stat().st_size
+        if size == 0:
+            raise refuse("is empty")
+        if size > _MAX_BYTES:
+            raise refuse(f"has {size} bytes (limit {_MAX_BYTES}); crop or thin it first")
+        return where.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise refuse(f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
