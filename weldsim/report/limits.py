@@ -80,6 +80,17 @@ def checks(report: WeldReport, config: ReportConfig) -> tuple[Check, ...]:
     return tuple(out)
 
 
+def verdict(report: WeldReport, found: int, config: ReportConfig) -> tuple[str, str]:
+    """A headline and what decided it: PASSED or FAILED where figures were judged, or else how many seams were found."""
+    judged = sum(check.passed is not None for check in checks(report, config))
+    if not report.passed:
+        first, *others = report.reasons
+        return "FAILED", first + (f" (and {len(others)} more)" if others else "")
+    if judged:
+        return "PASSED", f"all {judged} limits kept"
+    return f"{found} SEAM{'' if found == 1 else 'S'} FOUND", "no known seam to compare with"
+
+
 def line_checks(who: str, error: LineError, config: ReportConfig) -> list[Check]:
     """The checks of one line against the known seam."""
     return [

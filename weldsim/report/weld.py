@@ -6,14 +6,13 @@ from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 from numpy import ndarray
 
-from weldsim.frames import unit
 from weldsim.records import ExecutionLog, KnownSeam, LineError, Seam, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import ReportConfig, checks
-from weldsim.report.metrics import STEP, line_error, match_seams, region_overlap, sigma_coverage
-from weldsim.report.tracking import speed_error, tracking_error
+from weldsim.report.metrics import line_error, match_seams, region_overlap, sigma_coverage
+from weldsim.report.tracking import speed_error, thinned, tracking_error
 
 REPORT_SCHEMA = "weldsim.report/1"
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mujoco", "mink", "ruckig", "open3d")
@@ -124,24 +123,6 @@ def executed_error(log: ExecutionLog, known: KnownSeam, seam: Seam) -> LineError
     """The measured torch tip and wire axis against the known seam, with the arc on; None when it never moved."""
     tip, wire = thinned(log)
     return line_error(tip, wire, known, seam.reference) if len(tip) > 1 else None
-
-
-def thinned(log: ExecutionLog) -> tuple[Float[ndarray, "m 3"], Float[ndarray, "m 3"]]:
-    """Tip positions [m] and wire axes with the arc on, averaged over each 0.5 mm of commanded path.
-
-    At 125 to 500 samples a second and 6 mm/s, neighbouring samples are nearer than the encoders' noise: the polyline
-    through all of them zigzags and its arc length means nothing.
-    """
-    on = np.flatnonzero(log.arc_on)
-    step = np.floor((log.s_cmd[on] - log.s_cmd[on[0]]) / STEP).astype(int) if len(on) else on
-    _, group, count = np.unique(step, return_inverse=True, return_counts=True)
-    X = log.X_BT_act[on]
-    columns = np.concatenate([X.p, X.R[:, :, 2]], axis=1)
-    mean = np.stack([np.bincount(group, column) for column in columns.T], axis=1) / count[:, None]
-    if len(mean) > 1:
-        # The first and last instants stand for the ends, which averaging would move inwards.
-        mean[0], mean[-1] = columns[0], columns[-1]
-    return mean[:, :3], unit(mean[:, 3:])
 
 
 def versions() -> dict[str, str]:

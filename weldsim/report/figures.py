@@ -1,0 +1,255 @@
+"""The interactive figures of the report page, as plain plotly figure dictionaries ({"data", "layout"}), lengths in millimetres.
+
+Plain dictionaries because plotly's own figure classes take over a second to load; the tests validate each against them.
+"""
+
+import base64
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from weldsim import units
+from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindings, TorchPath
+from weldsim.report.limits import ReportConfig
+from weldsim.report.style import GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
+from weldsim.report.tracking import speed_error
+from weldsim.report.view import CrossSection, ErrorLine, height_range, shown, torch_axes, view_frame
+
+Figure = dict[str, Any]
+CLOUD_LIMIT = 60_000  # points drawn
+LINE_LIMIT = 3000  # samples drawn of one line
+
+
+def scene(
+    cloud: PointCloud,
+    findings: SeamFindings,
+    paths: tuple[TorchPath, ...],
+    log: ExecutionLog | None,
+    known: tuple[KnownSeam, ...],
+) -> Figure:
+    """Cloud, groove region, lips, centre lines, torch path and wires in the robot base."""
+    X_BS = view_frame(cloud, findings.seams)
+    index = shown(cloud, findings.seams, CLOUD_LIMIT)
+    points = cloud.points[index]
+    heights = X_BS.inverse().points(points)[:, 2]
+    low, high = height_range(heights)
+    colour = {"color": _array(1e3 * heights), "colorscale": "Cividis", "cmin": 1e3 * low, "cmax": 1e3 * high}
+    bar = {"title": {"text": "height [mm]", "side": "right"}, "thickness": 12, "len": 0.6, "x": 1.0, "outlinewidth": 0}
+    data = [_dots("cloud", points, {"size": 1.8, **colour, "colorbar": bar})]
+    inside = findings.region[index] > 0 if len(findings.region) == len(cloud) else np.zeros(len(index), bool)
+    if inside.any():
+        data.append(_dots("groove region", points[inside], {"size": 2.2, "color": REGION, "opacity": 0.55}))
+    for i, seam in enumerate(findings.seams):
+        sides = [side for side in (seam.left_B, seam.right_B) if side is not None]
+        data += [_line("lips", side, LIPS, 4, legend=i == k == 0, dash="dash") for k, side in enumerate(sides)]
+        data.append(_line("centre line", seam.points_B, "#ffffff", 3, legend=i == 0))
+    for i, path in enumerate(paths):
+        data.append(_line("torch path", path.X_BT.p[path.weld], SEAM, 7, legend=i == 0))
+        wires = np.full((len(torch_axes(path)), 3, 3), np.nan)
+        wires[:, :2] = torch_axes(path)
+        data.append(_line("wire", wires.reshape(-1, 3), WIRE, 4, legend=i == 0))
+    data += [_line("known seam", k.opening_B, KNOWN, 4, legend=i == 0) for i, k in enumerate(known)]
+    if log is not None and log.arc_on.any():
+        data.append(_line("executed tip", _thin(log.X_BT_act.p[log.arc_on]), LINES["executed"], 3))
+    eye = 0.9 * X_BS.R[:, 2] - 0.75 * X_BS.R[:, 1]
+    axis = {"backgroundcolor": "#f7f9fa", "gridcolor": GRID, "showbackground": True, "color": SOFT, "tickfont": {"size": 10}}
+    layout = _layout("", "", height=620)
+    del layout["xaxis"], layout["yaxis"]
+    layout |= {
+        "scene": {
+            **{f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}} for name in "xyz"},
+            "aspectmode": "data",
+            "camera": {"eye": _xyz(1.25 * eye), "up": _xyz(X_BS.R[:, 2])},
+        },
+        "margin": {"l": 0, "r": 0, "t": 8, "b": 0},
+        "legend": {"orientation": "h", "y": 0.01, "x": 0.01, "bgcolor": "rgba(255,255,255,0.8)", "itemsizing": "constant"},
+    }
+    return {"data": data, "layout": layout}
+
+
+def uncertainty(seam: Seam) -> Figure:
+    """Standard deviation across the seam, and the width between the lips, along it."""
+    s = 1e3 * seam.s
+    data = []
+    if seam.sigma is not None:
+        data.append(_trace("sigma", s, 1e3 * seam.sigma, SEAM, fill="tozeroy", fillcolor="rgba(228,87,46,0.10)"))
+    if seam.left_B is not None and seam.right_B is not None:
+        width = 1e3 * np.linalg.norm(seam.left_B - seam.right_B, axis=1)
+        data.append(_trace("width, right scale", s, width, WIRE, dash="dot", yaxis="y2"))
+    layout = _layout("along the seam [mm]", "sigma [mm]")
+    layout["yaxis"]["rangemode"] = "tozero"
+    layout["yaxis2"] = {
+        "overlaying": "y",
+        "side": "right",
+        "title": {"text": "width [mm]"},
+        "showgrid": False,
+        "rangemode": "tozero",
+        "linecolor": GRID,
+    }
+    layout["margin"]["r"] = 56
+    return {"data": data, "layout": layout}
+
+
+def section(cut: CrossSection) -> Figure:
+    """The mean cross-section with the opening."""
+    x = 1e3 * cut.across
+    data = [
+        _trace("", x, 1e3 * cut.low, "rgba(0,0,0,0)", legend=False),
+        _trace("cloud, 16 to 84 %", x, 1e3 * cut.high, "rgba(0,0,0,0)", fill="tonexty", fillcolor="rgba(125,155,184,0.5)"),
+        _trace("cloud, median", x, 1e3 * cut.median, WIRE),
+    ]
+    if cut.lips is not None:
+        lips = 1e3 * cut.lips
+        data.append(_trace("opening, as fitted", lips[:, 0], lips[:, 1], LIPS, dash="dash", mode="lines+markers"))
+    data.append(_trace("reference line", np.zeros(1), np.zeros(1), SEAM, mode="markers"))
+    layout = _layout("across, seen along travel [mm]", "height [mm]")
+    layout["xaxis"]["autorange"] = "reversed"
+    return {"data": data, "layout": layout}
+
+
+def errors_across(lines: dict[str, ErrorLine]) -> Figure:
+    """Error across the known seam of plan and executed tip, in the band of 2 sigma that was claimed."""
+    data = []
+    plan = lines["plan"]
+    if plan.sigma is not None:
+        x, edge = 1e3 * _thin(plan.s), 2e3 * _thin(plan.sigma)
+        data.append(_trace("", x, -edge, "rgba(0,0,0,0)", legend=False))
+        data.append(_trace("2 sigma, as reported", x, edge, "rgba(0,0,0,0)", fill="tonexty", fillcolor="rgba(228,87,46,0.12)"))
+    for name, line in lines.items():
+        data.append(_trace(name, 1e3 * _thin(line.s), 1e3 * _thin(line.across), LINES[name], width=WIDTHS[name]))
+    return {"data": data, "layout": _layout("along the seam [mm]", "left of the seam [mm]")}
+
+
+def errors_distance(lines: dict[str, ErrorLine], config: ReportConfig) -> Figure:
+    """Cross-track distance in space of plan and executed tip, below its limits."""
+    data = [
+        _trace(name, 1e3 * _thin(line.s), 1e3 * _thin(line.distance), LINES[name], width=WIDTHS[name])
+        for name, line in lines.items()
+    ]
+    layout = _layout("along the seam [mm]", "cross-track distance [mm]")
+    layout["yaxis"]["rangemode"] = "tozero"
+    limits = {"mean": config.mean, "p95": config.p95, "max": config.max}
+    layout["shapes"] = [_level(units.to_mm(value)) for value in limits.values()]
+    layout["annotations"] = [
+        {"x": 1, "xref": "paper", "xanchor": "right", "y": units.to_mm(value), "yanchor": "bottom", "showarrow": False}
+        | {"text": f"limit of {name}", "font": {"size": 10, "color": SOFT}}
+        for name, value in limits.items()
+    ]
+    return {"data": data, "layout": layout}
+
+
+def torch_speed(log: ExecutionLog, path: TorchPath, config: ReportConfig) -> Figure | None:
+    """Measured torch speed along the weld beside the planned one with its tolerance; None for a weld too short to judge."""
+    speed = speed_error(log, path)
+    if speed is None:
+        return None
+    s, planned = 1e3 * _thin(speed.s), 1e3 * _thin(speed.planned)
+    data = [
+        _trace("", s, planned * (1 - config.speed), "rgba(0,0,0,0)", legend=False),
+        _trace(f"planned +-{100 * config.speed:g} %", s, planned * (1 + config.speed), "rgba(0,0,0,0)")
+        | {"fill": "tonexty", "fillcolor": "rgba(27,127,75,0.14)"},
+        _trace("measured", s, 1e3 * _thin(speed.speed), LINES["executed"]),
+    ]
+    layout = _layout("along the path [mm]", "torch speed [mm/s]")
+    layout["yaxis"]["rangemode"] = "tozero"
+    return {"data": data, "layout": layout}
+
+
+def joints(log: ExecutionLog, which: str, names: tuple[str, ...]) -> Figure:
+    """Joint angles ("q", deg), speeds ("qd", deg/s) or torques ("torque", Nm) over time; the weld is shaded."""
+    values = {"q": np.rad2deg(log.q_act), "qd": np.rad2deg(log.qd_act), "torque": log.torque}[which]
+    label = {"q": "joint angle [deg]", "qd": "joint speed [deg/s]", "torque": "joint torque [Nm]"}[which]
+    layout = _layout("time [s]", label)
+    if log.arc_on.any():
+        on = log.t[log.arc_on]
+        band = {"type": "rect", "xref": "x", "yref": "paper", "x0": float(on[0]), "x1": float(on[-1]), "y0": 0, "y1": 1}
+        layout["shapes"] = [{**band, "fillcolor": "rgba(228,87,46,0.07)", "line": {"width": 0}, "layer": "below"}]
+    t = _thin(log.t)
+    columns = () if values is None else values.T
+    data = [_trace(name, t, _thin(column), colour, width=1.5) for name, column, colour in zip(names, columns, JOINTS, strict=False)]
+    return {"data": data, "layout": layout}
+
+
+def _layout(x: str, y: str, height: int = 300) -> Figure:
+    axis = {"gridcolor": GRID, "zerolinecolor": "#c5ccd3", "linecolor": GRID, "automargin": True}
+    return {
+        "height": height,
+        "margin": {"l": 56, "r": 16, "t": 34, "b": 46},
+        "font": {"family": "system-ui, 'Segoe UI', Roboto, 'Liberation Sans', sans-serif", "size": 12, "color": INK},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "hovermode": "closest",
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
+        "xaxis": {**axis, "title": {"text": x}},
+        "yaxis": {**axis, "title": {"text": y}},
+    }
+
+
+def _trace(
+    name: str,
+    x: ndarray,
+    y: ndarray,
+    colour: str,
+    *,
+    width: float = 2.0,
+    dash: str = "solid",
+    mode: str = "lines",
+    fill: str = "none",
+    fillcolor: str = "rgba(0,0,0,0)",
+    yaxis: str = "y",
+    legend: bool = True,
+) -> Figure:
+    return {
+        "type": "scatter",
+        "mode": mode,
+        "name": name,
+        "x": _array(x),
+        "y": _array(y),
+        "line": {"color": colour, "width": width, "dash": dash},
+        "marker": {"color": colour, "size": 8},
+        "fill": fill,
+        "fillcolor": fillcolor,
+        "yaxis": yaxis,
+        "showlegend": legend,
+        "hoverinfo": "x+y+name" if legend else "skip",
+    }
+
+
+def _dots(name: str, points_B: ndarray, marker: Figure) -> Figure:
+    x, y, z = 1e3 * points_B.T
+    return {"type": "scatter3d", "mode": "markers", "name": name, "hoverinfo": "skip", "marker": marker} | {
+        "x": _array(x),
+        "y": _array(y),
+        "z": _array(z),
+    }
+
+
+def _line(name: str, points_B: ndarray, colour: str, width: float, *, legend: bool = True, dash: str = "solid") -> Figure:
+    x, y, z = 1e3 * _thin(points_B).T
+    style = {"color": colour, "width": width, "dash": dash}
+    return {"type": "scatter3d", "mode": "lines", "name": name, "line": style, "legendgroup": name, "showlegend": legend} | {
+        "x": _array(x),
+        "y": _array(y),
+        "z": _array(z),
+        "hoverinfo": "name",
+    }
+
+
+def _level(y: float) -> Figure:
+    return {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": y, "y1": y, "line": {"color": SOFT, "width": 1, "dash": "dot"}}
+
+
+def _xyz(v: ndarray) -> dict[str, float]:
+    return {name: round(float(value), 6) for name, value in zip("xyz", v, strict=True)}
+
+
+def _thin(values: ndarray) -> ndarray:
+    """Every k-th sample, so that no line has over `LINE_LIMIT` of them; the last is kept."""
+    step = -(-len(values) // LINE_LIMIT)
+    return values if step <= 1 else np.concatenate([values[:-1:step], values[-1:]])
+
+
+def _array(values: ndarray) -> dict[str, str]:
+    """A typed array as plotly.js reads it: float32, a micrometre in 10 m."""
+    return {"dtype": "f4", "bdata": base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()}

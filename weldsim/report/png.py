@@ -1,0 +1,219 @@
+"""One picture of a job for a page or a mail: plan view of the cloud with the seam, cross-section, errors along the seam.
+
+Imports matplotlib: import this module where a picture is asked for, not before.
+"""
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from numpy import ndarray
+
+from weldsim import units
+from weldsim.frames import Transform
+from weldsim.output import write_whole
+from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, TorchPath, WeldReport
+from weldsim.report.limits import ReportConfig, verdict
+from weldsim.report.style import BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
+from weldsim.report.view import MARGIN, CrossSection, cross_section, error_lines, height_range, torch_axes, view_frame
+
+EMPTY = "#eef1f4"
+OBLIQUE = np.array([0.25, 0.55])
+RATIO = 0.72  # height of the plan view over its width
+PIXEL = 1e-3  # [m] of the plan view
+
+
+def write_png(
+    path: Path | str,
+    report: WeldReport,
+    cloud: PointCloud,
+    findings: SeamFindings,
+    paths: tuple[TorchPath, ...],
+    *,
+    log: ExecutionLog | None = None,
+    known: tuple[KnownSeam, ...] = (),
+    welded: int = 0,
+    config: ReportConfig | None = None,
+) -> Path:
+    """The picture written, 1600 x 900 pixels. Raises OutputError."""
+    figure = Figure(figsize=(16, 9), dpi=100, facecolor="white")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, top=0.86, bottom=0.08, width_ratios=(1.75, 1), hspace=0.34, wspace=0.16)
+    _headline(figure, report, findings, config or ReportConfig())
+    _plan_view(figure, figure.add_subplot(grid[:, 0]), cloud, findings, paths)
+    upper, lower = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+    if findings.seams:
+        _section(upper, cross_section(cloud, findings.seams[welded]))
+        _along(lower, findings, paths, log, known, welded)
+    else:
+        _refused(upper, findings)
+        lower.set_axis_off()
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": "weldsim"})
+    return write_whole(path, buffer.getvalue())
+
+
+def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config: ReportConfig) -> None:
+    """Scene, verdict and what decided it, over the whole width."""
+    word, why = verdict(report, len(findings.seams), config)
+    figure.text(0.05, 0.945, f"{report.scene}", fontsize=20, weight="bold", color=INK, va="center")
+    figure.text(0.97, 0.945, word, fontsize=20, weight="bold", color=GOOD if report.passed else BAD, va="center", ha="right")
+    count = len(findings.seams)
+    facts = [f"{count} seam{'' if count == 1 else 's'}", f"method {report.method}"]
+    if count:
+        seam = findings.seams[0]
+        facts += [
+            f"{units.to_mm(seam.length):.1f} mm long, {units.to_mm(seam.width):.1f} mm wide, confidence {seam.confidence:.2f}"
+        ]
+    figure.text(0.05, 0.905, "   |   ".join(facts), fontsize=12, color=SOFT, va="center")
+    figure.text(0.97, 0.905, why, fontsize=12, color=SOFT, va="center", ha="right")
+
+
+def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFindings, paths: tuple[TorchPath, ...]) -> None:
+    """The cloud as heights over the parent surface, seen along its normal, with lips, centre line and wires."""
+    X_SB = view_frame(cloud, findings.seams).inverse()
+    points = X_SB.points(cloud.points)
+    window = _window(points, [X_SB.points(seam.points_B) for seam in findings.seams])
+    points = points[((points[:, :2] >= window[0]) & (points[:, :2] <= window[1])).all(axis=1)]
+    image, extent = _height_image(points)
+    low, high = height_range(points[:, 2])
+    drawn = axes.imshow(
+        1e3 * image, extent=extent, origin="lower", cmap="cividis", vmin=1e3 * low, vmax=1e3 * high, interpolation="nearest"
+    )
+    bar = figure.colorbar(drawn, ax=axes, orientation="horizontal", fraction=0.035, pad=0.085, aspect=50)
+    bar.set_label("height over the parent surface [mm]", color=INK)
+    bar.outline.set_visible(False)
+    for i, (seam, path) in enumerate(zip(findings.seams, paths, strict=False)):
+        for k, side in enumerate(side for side in (seam.left_B, seam.right_B) if side is not None):
+            _trace(axes, X_SB, side, LIPS, 1.2, "--", "lips" if i == k == 0 else None)
+        # Seen along the normal a wire is a dot: its height is drawn obliquely, as in a cabinet projection.
+        ends = 1e3 * X_SB.points(torch_axes(path).reshape(-1, 3)).reshape(-1, 2, 3)
+        wires = ends[:, :, :2] + (ends[:, :, 2:] - ends[:, :1, 2:]) * OBLIQUE
+        axes.add_collection(
+            LineCollection(list(wires), colors=WIRE, linewidths=1.1, label="wire, drawn obliquely" if i == 0 else None)
+        )
+        axes.scatter(*wires[:, 0].T, s=9, color=WIRE, zorder=3)
+        _trace(axes, X_SB, path.X_BT.p[path.weld], SEAM, 2.4, "-", "torch path" if i == 0 else None)
+        start = 1e3 * X_SB.points(path.X_BT.p[path.weld][:1])[0]
+        axes.annotate(f"{i + 1}", start[:2], xytext=(-14, 8), textcoords="offset points", color=SEAM, weight="bold", fontsize=13)
+    axes.set_xlabel("along [mm]", color=INK)
+    axes.set_ylabel("across [mm]", color=INK)
+    axes.set_aspect("equal")
+    axes.set_facecolor(EMPTY)
+    axes.set_xlim(*(1e3 * window[:, 0]))
+    axes.set_ylim(*(1e3 * window[:, 1]))
+    if findings.seams:
+        axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=10)
+    _plain(axes, grid=False)
+    axes.set_title("Seen along the surface normal", loc="left", fontsize=13, color=INK)
+
+
+def _window(points_S: ndarray, seams_S: list[ndarray]) -> ndarray:
+    """Lowest and highest corner of the plan view [m]: around the seams, or the cloud, in the shape of the page."""
+    ours = np.concatenate(seams_S)[:, :2] if seams_S else points_S[:, :2]
+    low, high = (ours.min(axis=0), ours.max(axis=0)) if seams_S else np.percentile(ours, [1, 99], axis=0)
+    size = high - low + 2 * MARGIN / (1 if seams_S else 4)
+    width = max(size[0], size[1] / RATIO)
+    half = np.array([width, RATIO * width]) / 2
+    return np.stack([(low + high) / 2 - half, (low + high) / 2 + half])
+
+
+def _trace(axes: Axes, X_SB: Transform, points_B: ndarray, colour: str, width: float, style: str, label: str | None) -> None:
+    x, y, _ = 1e3 * X_SB.points(points_B).T
+    axes.plot(x, y, style, color=colour, lw=width, label=label)
+
+
+def _height_image(points_S: ndarray) -> tuple[ndarray, tuple[float, float, float, float]]:
+    """Mean height of each pixel [m], NaN where the cloud has none, and its extent [mm]."""
+    low, high = points_S[:, :2].min(axis=0), points_S[:, :2].max(axis=0)
+    # A sparse cloud gets larger pixels, so that it still covers the picture.
+    pixel = max(PIXEL, float(np.sqrt(5 * np.prod(high - low) / len(points_S))))
+    shape = np.maximum(1, np.ceil((high - low) / pixel).astype(int))
+    column, row = np.minimum(((points_S[:, :2] - low) / pixel).astype(int), shape - 1).T
+    flat = row * shape[0] + column
+    count = np.bincount(flat, minlength=shape.prod())
+    total = np.bincount(flat, points_S[:, 2], minlength=shape.prod())
+    image = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape[1], shape[0])
+    edge = low + shape * pixel
+    return image, (1e3 * low[0], 1e3 * edge[0], 1e3 * low[1], 1e3 * edge[1])
+
+
+def _section(axes: Axes, section: CrossSection) -> None:
+    x = 1e3 * section.across
+    axes.fill_between(x, 1e3 * section.low, 1e3 * section.high, color="#9db4c9", alpha=0.6, lw=0, label="cloud, 16 to 84 %")
+    axes.plot(x, 1e3 * section.median, color=WIRE, lw=1.8, label="cloud, median")
+    if section.lips is not None:
+        left, right = 1e3 * section.lips
+        axes.plot([left[0], right[0]], [left[1], right[1]], "--", color=LIPS, lw=1.2, label="opening, as fitted")
+        axes.plot([left[0], right[0]], [left[1], right[1]], "o", color=LIPS, ms=6)
+    axes.plot(0, 0, "o", color=SEAM, ms=9, label="reference line", zorder=5)
+    axes.set_title("Mean cross-section", loc="left", fontsize=13, color=INK)
+    axes.set_xlabel("across, seen along travel [mm]")
+    axes.set_ylabel("height [mm]")
+    axes.set_xlim(1e3 * 0.025, -1e3 * 0.025)
+    axes.legend(frameon=False, fontsize=9, loc="lower left", ncols=2)
+    low = float(1e3 * section.median.min()) if len(section.median) else -1.0
+    axes.set_ylim(1.6 * low - 3, 0.25 * abs(low) + 2)
+    _plain(axes)
+
+
+def _along(
+    axes: Axes,
+    findings: SeamFindings,
+    paths: tuple[TorchPath, ...],
+    log: ExecutionLog | None,
+    known: tuple[KnownSeam, ...],
+    welded: int,
+) -> None:
+    """Error across the seam against the known one, in its band of sigma; without a known seam, sigma and width."""
+    seam = findings.seams[welded]
+    s = 1e3 * seam.s
+    lines = error_lines(findings, paths, log, known, welded)
+    if lines:
+        axes.axhline(0, color=SOFT, lw=0.8)
+        for name, line in lines.items():
+            axes.plot(1e3 * line.s, 1e3 * line.across, color=LINES[name], lw=WIDTHS[name], alpha=0.85, label=name)
+            if line.sigma is not None:
+                edge = 1e3 * line.sigma
+                axes.fill_between(1e3 * line.s, -2 * edge, 2 * edge, color=SEAM, alpha=0.13, lw=0, label="2 sigma, as reported")
+        axes.set_title("Error across the known seam", loc="left", fontsize=13, color=INK)
+        axes.set_ylabel("left of the seam [mm]")
+        reach = 1.25 * max(0.5, *(1e3 * float(np.abs(line.across).max()) for line in lines.values()))
+        axes.set_ylim(-reach, reach)
+    elif seam.sigma is not None:
+        axes.plot(s, 1e3 * seam.sigma, color=SEAM, lw=1.8, label="sigma across the seam")
+        axes.set_ylim(0, 1.35e3 * float(seam.sigma.max()) + 1e-3)
+        axes.set_title("Standard deviation along the seam", loc="left", fontsize=13, color=INK)
+        axes.set_ylabel("sigma [mm]")
+    else:
+        axes.set_title("The method gives no standard deviation", loc="left", fontsize=13, color=SOFT)
+    axes.set_xlabel("along the seam [mm]")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False, fontsize=9, loc="upper right", ncols=3)
+    _plain(axes)
+
+
+def _refused(axes: Axes, findings: SeamFindings) -> None:
+    """Why nothing in view is a seam, in place of a cross-section."""
+    listed = [f"{units.to_mm(r.length):.0f} mm long: {r.reason}" for r in findings.rejected[:14]]
+    axes.set_axis_off()
+    axes.set_title("Candidates refused", loc="left", fontsize=13, color=INK)
+    axes.text(0, 0.95, "\n".join(listed) or "There were none.", va="top", color=INK, fontsize=11, transform=axes.transAxes)
+
+
+def _plain(axes: Axes, *, grid: bool = True) -> None:
+    """Light axes: no box, a faint grid."""
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color("#b8c0c8")
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set_color(INK)
+    axes.tick_params(colors=SOFT, labelsize=10)
+    if grid:
+        axes.grid(color=GRID, lw=0.8)
+        axes.set_axisbelow(True)
