@@ -52,7 +52,7 @@ def new_cell(material: MaterialConfig) -> Spec:
     _add_lights(spec)
     _add_table(spec)
     _add_kinect(spec)
-    look_at(spec.worldbody, "overview", (1.55, 1.45, 1.75), (-0.02, 0.26, 0.93), 38)
+    look_at(spec.worldbody, "overview", (1.60, 1.60, 1.80), (-0.06, 0.26, 0.98), 40)
     look_at(spec.worldbody, "closeup", (0.55, 0.98, 1.18), (0.0, 0.46, 0.82), 36)
     return spec
 
@@ -85,8 +85,23 @@ def _add_materials(spec: Spec, part: MaterialConfig) -> None:
         width=300,
         height=300,
     )
+    _add_hole_grid(spec)
     floor = spec.add_material(name="floor", texrepeat=[1.5, 1.5], texuniform=True, reflectance=0.04, specular=0.1, shininess=0.2)
     floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
+
+
+def _add_hole_grid(spec: Spec) -> None:
+    """The table's material: dark steel with 16 mm holes every 100 mm, drawn, not cut."""
+    size, pitch, radius = 128, 0.100, 0.008
+    u = (np.arange(size) + 0.5) / size * pitch - pitch / 2
+    distance = np.hypot(u[:, None], u[None, :])
+    edge = np.clip((distance - radius) / (pitch / size), 0.0, 1.0)  # one pixel of softness
+    ring = 1 + 0.25 * np.exp(-(((distance - radius - 0.001) / 0.0007) ** 2))
+    colour = np.array(MATERIALS["table"][0])[None, None, :] * (0.15 + 0.85 * edge[..., None]) * ring[..., None]
+    texture = spec.add_texture(name="table", type=mujoco.mjtTexture.mjTEXTURE_2D, width=size, height=size, nchannel=3)
+    texture.data = (np.clip(colour, 0, 1) * 255).astype(np.uint8).tobytes()
+    top = spec.add_material(name="table_top", texrepeat=[2 / pitch, 2 / pitch], texuniform=True, specular=0.25, shininess=0.35)
+    top.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "table"
 
 
 def _add_lights(spec: Spec) -> None:
@@ -106,7 +121,7 @@ def _add_table(spec: Spec) -> None:
     floor = world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[4.0, 4.0, 0.1], contype=1, conaffinity=1)
     floor.material = "floor"
     middle, half = np.array([0.0, 0.32, TABLE_TOP - 0.02]), np.array([0.60, 0.52, 0.02])
-    box(world, "table", middle, half, "table", collide=True)
+    box(world, "table", middle, half, "table_top", collide=True)
     for i, (sx, sy) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
         x, y = middle[0] + sx * (half[0] - 0.05), middle[1] + sy * (half[1] - 0.05)
         box(world, f"table_leg_{i}", (x, y, (TABLE_TOP - 0.04) / 2), (0.035, 0.035, (TABLE_TOP - 0.04) / 2), "frame")
@@ -115,16 +130,15 @@ def _add_table(spec: Spec) -> None:
 
 
 def _add_kinect(spec: Spec) -> None:
-    """The Kinect v2, 249 x 66 x 67 mm, under a beam whose mast stands behind the table."""
-    world, eye = spec.worldbody, X_WC_KINECT.p
-    top = eye[2] + 0.10
-    mast_y = 0.95
-    box(world, "kinect_mast", (eye[0], mast_y, top / 2), (0.0225, 0.0225, top / 2), "profile")
-    box(world, "kinect_foot", (eye[0], mast_y, 0.01), (0.20, 0.14, 0.01), "frame")
-    box(world, "kinect_beam", (eye[0], (mast_y + eye[1]) / 2, top), (0.0225, (mast_y - eye[1]) / 2 + 0.0225, 0.0225), "profile")
-    # The depth lens is not in the middle of the housing: 6 cm or so to one side of it.
-    box(world, "kinect_housing", (eye[0] + 0.06, eye[1], eye[2] + 0.0345), (0.1245, 0.033, 0.0335), "kinect")
+    """The Kinect v2, 249 x 66 x 67 mm, under a beam whose mast stands beside the table."""
+    world, (x, y, z) = spec.worldbody, X_WC_KINECT.p
+    mast_x, top = -0.72, z + 0.10
+    box(world, "kinect_mast", (mast_x, y, top / 2), (0.0225, 0.0225, top / 2), "profile")
+    box(world, "kinect_foot", (mast_x, y, 0.01), (0.14, 0.20, 0.01), "frame")
+    box(world, "kinect_beam", ((mast_x + x) / 2, y, top), ((x - mast_x) / 2 + 0.0225, 0.0225, 0.0225), "profile")
+    # The depth lens is not in the middle of the housing: about 6 cm to one side of it.
+    box(world, "kinect_housing", (x + 0.06, y, z + 0.0345), (0.1245, 0.033, 0.0335), "kinect")
+    box(world, "kinect_post", (x, y, z + 0.0725), (0.015, 0.015, 0.0055), "frame")
     for i, (dx, radius) in enumerate(((0.0, 0.010), (-0.03, 0.007), (0.06, 0.012))):
-        rod(world, f"kinect_lens_{i}", (eye[0] + dx, eye[1], eye[2] + 0.001), (eye[0] + dx, eye[1], eye[2] + 0.0015), radius, "lens")
+        rod(world, f"kinect_lens_{i}", (x + dx, y, z + 0.001), (x + dx, y, z + 0.0015), radius, "lens")
     camera(world, "kinect", X_WC_KINECT, KINECT_V2)
-

@@ -29,7 +29,7 @@ class PartPoseConfig:
     """
 
     x: Metre = 0.0
-    y: Metre = -0.48
+    y: Metre = -0.45
     clearance: Metre = 0.0
     yaw: Radian = 0.0
     tilt: Radian = 0.0

@@ -51,5 +51,7 @@ def asset_path(*parts: str) -> Path:
     """
     path = _data_folder("assets").joinpath(*parts)
     if not path.exists():
-        raise SceneError(f"asset {'/'.join(parts)}: not found in {_data_folder('assets')}; reinstall weldsim", asset="/".join(parts))
+        raise SceneError(
+            f"asset {'/'.join(parts)}: not found in {_data_folder('assets')}; reinstall weldsim", asset="/".join(parts)
+        )
     return path

@@ -17,7 +17,7 @@ def add_clamps(part: Body, config: FixtureConfig, plate: PlateConfig) -> None:
     limit = min(plate.width / 4, 0.045)
     if config.clamps and not 0 < config.overlap <= limit:
         raise SceneError(
-            f"fixture: a clamp's overlap of {config.overlap * 1e3:g} mm must be over 0 and at most {limit * 1e3:g} mm on this plate",
+            f"fixture: a clamp's overlap of {config.overlap * 1e3:g} mm must be over 0 and at most {limit * 1e3:g} mm here",
             key="overlap",
             limit=limit,
         )
@@ -42,7 +42,9 @@ def _add_clamp(part: Body, name: str, x: float, side: int, overlap: float, plate
     box(part, f"{name}_nose", (x, y(-overlap / 2), thick + 0.002), (0.0125, overlap / 2, 0.002), "clamp")
     for i in range(3):
         height = plate.thickness * (i + 1) / 3
-        box(part, f"{name}_step_{i}", (x, y(0.085 - 0.012 * i), -plate.thickness + height / 2), (0.0125, 0.006, height / 2), "clamp")
+        box(
+            part, f"{name}_step_{i}", (x, y(0.085 - 0.012 * i), -plate.thickness + height / 2), (0.0125, 0.006, height / 2), "clamp"
+        )
     stud = y(0.030)
     rod(part, f"{name}_stud", (x, stud, -plate.thickness), (x, stud, thick + 0.030), 0.005, "zinc")
     rod(part, f"{name}_washer", (x, stud, thick), (x, stud, thick + 0.0025), 0.012, "zinc")

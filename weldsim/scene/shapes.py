@@ -47,9 +47,7 @@ def rod(
 ) -> Any:
     """A cylinder, or a capsule, from `start` to `end`."""
     kind = mujoco.mjtGeom.mjGEOM_CAPSULE if round_ends else mujoco.mjtGeom.mjGEOM_CYLINDER
-    return _geom(
-        body, name, kind, material, group, collide, fromto=[*map(float, start), *map(float, end)], size=[radius, 0.0, 0.0]
-    )
+    return _geom(body, name, kind, material, group, collide, fromto=[*map(float, start), *map(float, end)], size=[radius, 0.0, 0.0])
 
 
 def mesh_geom(

@@ -1,5 +1,8 @@
 """What hangs on the flange: the torch, the wrist camera and its printed bracket, dimensioned about the mounts."""
 
+from functools import partial
+from itertools import pairwise
+
 import numpy as np
 
 from weldsim.frames import Transform
@@ -30,19 +33,19 @@ def _add_torch(tool: Body) -> None:
         """The point of the wire's axis `distance` [m] behind the tip."""
         return tip - distance * wire
 
-    robot = {"group": Group.ROBOT}
-    rod(tool, "wire", tip, along(STICK_OUT), 0.0006, "copper", **robot)
-    rod(tool, "contact_tip", along(STICK_OUT), along(STICK_OUT + 0.006), 0.004, "copper", **robot)
-    rod(tool, "nozzle_mouth", along(STICK_OUT + 0.001), along(0.045), 0.0085, "brass", **robot)
-    rod(tool, "nozzle", along(0.030), along(0.085), 0.0105, "brass", **robot)
-    rod(tool, "insulator", along(0.083), along(0.093), 0.0120, "rubber", **robot)
-    bend = [along(0.090), along(0.112), np.array([0.0, -0.0330, 0.128]), np.array([0.0, -0.030, 0.105]), np.array([0.0, -0.026, 0.085])]
-    for i, (a, b) in enumerate(zip(bend[:-1], bend[1:], strict=True)):
-        rod(tool, f"neck_{i}", a, b, 0.0085, "steel", round_ends=True, **robot)
-    rod(tool, "torch_body", (0.0, -0.026, 0.090), (0.0, -0.020, 0.030), 0.017, "rubber", **robot)
-    box(tool, "torch_clamp", (0.0, -0.020, 0.040), (0.026, 0.024, 0.012), "steel", **robot)
-    rod(tool, "tool_plate", (0.0, 0.0, 0.0), (0.0, 0.0, 0.012), 0.0375, "ur_aluminium", **robot)
-    box(tool, "torch_post", (0.0, -0.008, 0.021), (0.022, 0.020, 0.010), "steel", **robot)
+    draw_rod, draw_box = partial(rod, tool, group=Group.ROBOT), partial(box, tool, group=Group.ROBOT)
+    draw_rod("wire", tip, along(STICK_OUT), 0.0006, "copper")
+    draw_rod("contact_tip", along(STICK_OUT), along(STICK_OUT + 0.006), 0.004, "copper")
+    draw_rod("nozzle_mouth", along(STICK_OUT + 0.001), along(0.045), 0.0085, "brass")
+    draw_rod("nozzle", along(0.030), along(0.085), 0.0105, "brass")
+    draw_rod("insulator", along(0.083), along(0.093), 0.0120, "rubber")
+    bend = [along(0.090), along(0.112), *np.array([[0.0, -0.033, 0.128], [0.0, -0.030, 0.105], [0.0, -0.026, 0.085]])]
+    for i, (a, b) in enumerate(pairwise(bend)):
+        draw_rod(f"neck_{i}", a, b, 0.0085, "steel", round_ends=True)
+    draw_rod("torch_body", (0.0, -0.026, 0.090), (0.0, -0.020, 0.030), 0.017, "rubber")
+    draw_box("torch_clamp", (0.0, -0.020, 0.040), (0.026, 0.024, 0.012), "steel")
+    draw_rod("tool_plate", (0.0, 0.0, 0.0), (0.0, 0.0, 0.012), 0.0375, "ur_aluminium")
+    draw_box("torch_post", (0.0, -0.008, 0.021), (0.022, 0.020, 0.010), "steel")
     for name, a, b, radius in (
         ("nozzle_collision", along(STICK_OUT + 0.011), along(0.093), 0.011),
         ("neck_collision", along(0.090), (0.0, -0.026, 0.085), 0.014),
@@ -54,19 +57,19 @@ def _add_torch(tool: Body) -> None:
 
 def _add_camera(tool: Body, intrinsics: CameraIntrinsics) -> None:
     """The D415's housing, 99 x 20 x 23 mm, its front just behind the optical centre; the bracket carries it from the flange."""
-    robot = {"group": Group.ROBOT}
+    draw_rod, draw_box = partial(rod, tool, group=Group.ROBOT), partial(box, tool, group=Group.ROBOT)
 
     def at(x: float, y: float, z: float) -> np.ndarray:
         return X_FC.points(np.array([[x, y, z]]))[0]
 
     # The left imager is the optical centre; it sits 20 mm from the middle of the housing, which reaches further to image right.
-    box(tool, "d415_housing", at(0.020, 0.0, -0.0115), (0.0400, 0.0115, 0.0100), "d415_aluminium", **robot)
+    draw_box("d415_housing", at(0.020, 0.0, -0.0115), (0.0400, 0.0115, 0.0100), "d415_aluminium")
     for i, x in enumerate((-0.020, 0.060)):
-        rod(tool, f"d415_end_{i}", at(x, 0, -0.0215), at(x, 0, -0.0015), 0.0115, "d415_aluminium", **robot)
-    box(tool, "d415_window", at(0.020, 0.0, -0.0014), (0.0440, 0.0085, 0.0002), "glass", **robot)
+        draw_rod(f"d415_end_{i}", at(x, 0, -0.0215), at(x, 0, -0.0015), 0.0115, "d415_aluminium")
+    draw_box("d415_window", at(0.020, 0.0, -0.0014), (0.0440, 0.0085, 0.0002), "glass")
     for i, (x, radius) in enumerate(((-0.0175, 0.0035), (0.0, 0.0042), (0.030, 0.0030), (0.055, 0.0042))):
-        rod(tool, f"d415_lens_{i}", at(x, 0, -0.0013), at(x, 0, -0.0010), radius, "lens", **robot)
-    box(tool, "d415_back", at(0.020, 0.0, -0.0235), (0.024, 0.009, 0.002), "bracket", **robot)
+        draw_rod(f"d415_lens_{i}", at(x, 0, -0.0013), at(x, 0, -0.0010), radius, "lens")
+    draw_box("d415_back", at(0.020, 0.0, -0.0235), (0.024, 0.009, 0.002), "bracket")
     _bracket(tool, np.array([0.0, -0.030, 0.006]), at(0.020, 0.0, -0.024))
     box(tool, "d415_collision", at(0.020, 0.0, -0.0125), (0.0515, 0.0135, 0.0115), "collision", group=Group.COLLISION, collide=True)
     camera(tool, "d415", X_FC, intrinsics)
@@ -75,14 +78,12 @@ def _add_camera(tool: Body, intrinsics: CameraIntrinsics) -> None:
 def _bracket(tool: Body, start: np.ndarray, end: np.ndarray) -> None:
     """A printed arm: a plate on the flange, out to under the camera, and a post up to its back."""
     foot = np.array([end[0], end[1], start[2]])
-    arm = Transform.identity("FF")
     middle, span = (start + foot) / 2, foot - start
     length = float(np.linalg.norm(span))
     arm = Transform("FF", np.column_stack([span / length, np.cross([0, 0, 1.0], span / length), [0, 0, 1.0]]), middle)
-    robot = {"group": Group.ROBOT}
-    geom = box(tool, "bracket_arm", arm.p, (length / 2 + 0.008, 0.016, 0.004), "bracket", **robot)
+    draw_box = partial(box, tool, group=Group.ROBOT)
+    geom = draw_box("bracket_arm", arm.p, (length / 2 + 0.008, 0.016, 0.004), "bracket")
     geom.quat = arm.quaternion
-    box(tool, "bracket_post", (foot + end) / 2, (0.016, 0.004, float(end[2] - foot[2]) / 2 + 0.002), "bracket", **robot)
+    draw_box("bracket_post", (foot + end) / 2, (0.016, 0.004, float(end[2] - foot[2]) / 2 + 0.002), "bracket")
     geom = box(tool, "bracket_collision", arm.p, (length / 2, 0.016, 0.005), "collision", group=Group.COLLISION, collide=True)
     geom.quat = arm.quaternion
-

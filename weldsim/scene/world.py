@@ -22,7 +22,7 @@ from weldsim.scene.workpieces.base import Workpiece
 
 Label = Literal["groove", "part", "clamp", "table", "robot", "room"]
 
-HOME = np.array([-1.5708, -1.7453, -1.9199, -1.0472, 1.5708, 0.0])  # [rad] arm up and folded over the table, camera down
+HOME = np.array([-1.57, -1.30, -1.90, -1.50, 1.57, 0.0])  # [rad] elbow up, the wrist over the table, the camera looking down
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,7 +1,7 @@
 """Flat plates: one with a straight or curved groove, and a plain one that has no seam."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -229,14 +229,15 @@ def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: Cen
     return part
 
 
-def _blank(plate: PlateConfig):  # noqa: ANN202 - the type lives in a library that loads late
+def _blank(plate: PlateConfig) -> Any:
+    """The plate before its groove, as a solid of the library that loads late."""
     import manifold3d
 
     x, y, z = 2 * plate.half
     return manifold3d.Manifold.cube((x, y, z)).translate((-x / 2, -y / 2, -z)).as_original()
 
 
-def _solid(manifold) -> tuple[Float[ndarray, "n 3"], Int[ndarray, "m 3"], Int[ndarray, "m"]]:  # noqa: ANN001
+def _solid(manifold: Any) -> tuple[Float[ndarray, "n 3"], Int[ndarray, "m 3"], Int[ndarray, "m"]]:
     """Vertices, faces, and which original solid each face came from."""
     mesh = manifold.to_mesh64()
     faces = np.asarray(mesh.tri_verts).astype(np.int64)
