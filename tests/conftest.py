@@ -7,7 +7,7 @@ import pytest
 from jaxtyping import install_import_hook
 
 os.environ.setdefault("MUJOCO_GL", "egl")
-_hook = install_import_hook("weldsim", "beartype.beartype")
+_hook = install_import_hook("weldsim", "tests.typecheck.typecheck")
 
 
 @pytest.fixture(scope="session")
