@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from jaxtyping import install_import_hook
 
+import tests.typecheck  # noqa: F401 - the hook finds it by name
+
 os.environ.setdefault("MUJOCO_GL", "egl")
 _hook = install_import_hook("weldsim", "tests.typecheck.typecheck")
 
