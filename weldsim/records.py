@@ -49,7 +49,8 @@ def _require(condition: bool, record: object, name: str, message: str) -> None:
 
 def _check_metres(record: object, name: str, points: ndarray) -> None:
     if len(points):
-        span = float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
+        with np.errstate(over="ignore"):
+            span = max(float(column.max() - column.min()) for column in points.T)  # by column: reducing along axis 0 is slow
         _require(span <= MILLIMETRE_SPAN, record, name, f"spans {span:.4g} m (limit {MILLIMETRE_SPAN:g} m): looks like millimetres")
 
 
