@@ -12,7 +12,7 @@ from numpy import ndarray
 from weldsim import units
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindings, TorchPath
 from weldsim.report.limits import ReportConfig
-from weldsim.report.style import GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
+from weldsim.report.style import CENTRE, GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
 from weldsim.report.view import CrossSection, ErrorLine, height_range, shown, torch_axes, view_frame
 
@@ -31,19 +31,19 @@ def scene(
     """Cloud, groove region, lips, centre lines, torch path and wires in the robot base."""
     X_BS = view_frame(cloud, findings.seams)
     index = shown(cloud, findings.seams, CLOUD_LIMIT)
-    points = cloud.points[index]
+    inside = findings.region[index] > 0 if len(findings.region) == len(cloud) else np.zeros(len(index), bool)
+    points, groove = cloud.points[index[~inside]], cloud.points[index[inside]]
     heights = X_BS.inverse().points(points)[:, 2]
     low, high = height_range(heights)
     colour = {"color": _array(1e3 * heights), "colorscale": "Cividis", "cmin": 1e3 * low, "cmax": 1e3 * high}
     bar = {"title": {"text": "height [mm]", "side": "right"}, "thickness": 12, "len": 0.6, "x": 1.0, "outlinewidth": 0}
-    data = [_dots("cloud", points, {"size": 1.8, **colour, "colorbar": bar})]
-    inside = findings.region[index] > 0 if len(findings.region) == len(cloud) else np.zeros(len(index), bool)
-    if inside.any():
-        data.append(_dots("groove region", points[inside], {"size": 2.2, "color": REGION, "opacity": 0.55}))
+    data = [_dots("cloud", points, {"size": 2.2, **colour, "colorbar": bar})]
+    if len(groove):
+        data.append(_dots("groove region", groove, {"size": 2.4, "color": REGION}))
     for i, seam in enumerate(findings.seams):
         sides = [side for side in (seam.left_B, seam.right_B) if side is not None]
-        data += [_line("lips", side, LIPS, 4, legend=i == k == 0, dash="dash") for k, side in enumerate(sides)]
-        data.append(_line("centre line", seam.points_B, "#ffffff", 3, legend=i == 0))
+        data += [_line("lips", side, LIPS, 4, legend=i == k == 0) for k, side in enumerate(sides)]
+        data.append(_line("centre line", seam.points_B, CENTRE, 3, legend=i == 0))
     for i, path in enumerate(paths):
         data.append(_line("torch path", path.X_BT.p[path.weld], SEAM, 7, legend=i == 0))
         wires = np.full((len(torch_axes(path)), 3, 3), np.nan)
@@ -54,13 +54,14 @@ def scene(
         data.append(_line("executed tip", _thin(log.X_BT_act.p[log.arc_on]), LINES["executed"], 3))
     eye = 0.9 * X_BS.R[:, 2] - 0.75 * X_BS.R[:, 1]
     axis = {"backgroundcolor": "#f7f9fa", "gridcolor": GRID, "showbackground": True, "color": SOFT, "tickfont": {"size": 10}}
+    axis |= {"zeroline": False, "showspikes": False}
     layout = _layout("", "", height=620)
     del layout["xaxis"], layout["yaxis"]
     layout |= {
         "scene": {
             **{f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}} for name in "xyz"},
             "aspectmode": "data",
-            "camera": {"eye": _xyz(1.25 * eye), "up": _xyz(X_BS.R[:, 2])},
+            "camera": {"eye": _xyz(1.1 * eye), "up": _xyz(X_BS.R[:, 2])},
         },
         "margin": {"l": 0, "r": 0, "t": 8, "b": 0},
         "legend": {"orientation": "h", "y": 0.01, "x": 0.01, "bgcolor": "rgba(255,255,255,0.8)", "itemsizing": "constant"},
@@ -71,22 +72,25 @@ def scene(
 def uncertainty(seam: Seam) -> Figure:
     """Standard deviation across the seam, and the width between the lips, along it."""
     s = 1e3 * seam.s
-    data = []
+    data, top = [], {"yaxis": 0.0, "yaxis2": 0.0}
     if seam.sigma is not None:
+        top["yaxis"] = 1.3e3 * float(seam.sigma.max())
         data.append(_trace("sigma", s, 1e3 * seam.sigma, SEAM, fill="tozeroy", fillcolor="rgba(228,87,46,0.10)"))
     if seam.left_B is not None and seam.right_B is not None:
         width = 1e3 * np.linalg.norm(seam.left_B - seam.right_B, axis=1)
+        top["yaxis2"] = 1.15 * float(width.max())
         data.append(_trace("width, right scale", s, width, WIRE, dash="dot", yaxis="y2"))
     layout = _layout("along the seam [mm]", "sigma [mm]")
-    layout["yaxis"]["rangemode"] = "tozero"
     layout["yaxis2"] = {
         "overlaying": "y",
         "side": "right",
         "title": {"text": "width [mm]"},
         "showgrid": False,
-        "rangemode": "tozero",
+        "tickmode": "auto",
         "linecolor": GRID,
     }
+    for axis, value in top.items():
+        layout[axis] |= {"range": [0.0, value]} if value > 0 else {"visible": False}
     layout["margin"]["r"] = 56
     return {"data": data, "layout": layout}
 
@@ -180,7 +184,7 @@ def _layout(x: str, y: str, height: int = 300) -> Figure:
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "hovermode": "closest",
-        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0, "traceorder": "normal"},
         "xaxis": {**axis, "title": {"text": x}},
         "yaxis": {**axis, "title": {"text": y}},
     }
@@ -225,9 +229,9 @@ def _dots(name: str, points_B: ndarray, marker: Figure) -> Figure:
     }
 
 
-def _line(name: str, points_B: ndarray, colour: str, width: float, *, legend: bool = True, dash: str = "solid") -> Figure:
+def _line(name: str, points_B: ndarray, colour: str, width: float, *, legend: bool = True) -> Figure:
     x, y, z = 1e3 * _thin(points_B).T
-    style = {"color": colour, "width": width, "dash": dash}
+    style = {"color": colour, "width": width}
     return {"type": "scatter3d", "mode": "lines", "name": name, "line": style, "legendgroup": name, "showlegend": legend} | {
         "x": _array(x),
         "y": _array(y),

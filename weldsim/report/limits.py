@@ -70,13 +70,13 @@ def checks(report: WeldReport, config: ReportConfig) -> tuple[Check, ...]:
         out.append(_percent("torch speed error, max", report.speed_error_max, None))
     if report.phantom_seams is not None:
         passed = report.phantom_seams <= config.phantoms
-        out.append(Check(figure="phantom seams", value=str(report.phantom_seams), limit=f"<= {config.phantoms}", passed=passed))
+        out.append(Check(figure="phantom seams", value=str(report.phantom_seams), limit=str(config.phantoms), passed=passed))
     if report.iou is not None:
         out.append(Check(figure="groove region overlap (IoU)", value=f"{report.iou:.3f}", limit="", passed=None))
     if report.sigma_coverage is not None:
         one, two = report.sigma_coverage
         figure = "errors within 1 and 2 sigma (normal: 68 %, 95 %)"
-        out.append(Check(figure=figure, value=f"{one:.0%}, {two:.0%}", limit="", passed=None))
+        out.append(Check(figure=figure, value=f"{100 * one:.0f} %, {100 * two:.0f} %", limit="", passed=None))
     return tuple(out)
 
 
@@ -100,8 +100,8 @@ def line_checks(who: str, error: LineError, config: ReportConfig) -> list[Check]
         _length(f"{who}, cross-track max", error.max, config.max),
         Check(
             figure=f"{who}, coverage",
-            value=f"{error.coverage:.1%}",
-            limit=f">= {config.coverage:.0%}",
+            value=f"{100 * error.coverage:.1f} %",
+            limit=f">= {100 * config.coverage:g} %",
             passed=error.coverage >= config.coverage,
         ),
         _length(f"{who}, start beyond the seam", error.start, None, sign=True),
@@ -112,7 +112,7 @@ def line_checks(who: str, error: LineError, config: ReportConfig) -> list[Check]
 
 
 def _length(figure: str, value: float, limit: float | None, *, sign: bool = False) -> Check:
-    text = f"{units.to_mm(value):+.2f} mm" if sign else f"{units.to_mm(value):.3f} mm"
+    text = f"{round(units.to_mm(value), 2) + 0.0:+.2f} mm" if sign else f"{units.to_mm(value):.3f} mm"
     return _at_most(figure, value, limit, text, f"{units.to_mm(limit or 0.0):g} mm")
 
 

@@ -87,9 +87,10 @@ def speed_error(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = Non
     t = log.t[on]
     half = rule.window / 2
     p = log.X_BT_act.p
-    before, after = (np.stack([np.interp(t + h, log.t, p[:, i]) for i in range(3)], axis=1) for h in (-half, half))
-    span = np.clip(t + half, log.t[0], log.t[-1]) - np.clip(t - half, log.t[0], log.t[-1])
-    speed = np.linalg.norm(after - before, axis=1) / span
+    # Near arc start and stop the window is cut off, so that approach and retract do not leak in.
+    times = [np.clip(t + h, t[0], t[-1]) for h in (-half, half)]
+    before, after = (np.stack([np.interp(at, log.t, column) for column in p.T], axis=1) for at in times)
+    speed = np.linalg.norm(after - before, axis=1) / (times[1] - times[0])
     planned = np.interp(log.s_cmd[on], path.s, path.speed)
     judged = (t >= t[0] + rule.ramp) & (t <= t[-1] - rule.ramp)
     if not judged.any():

@@ -1,0 +1,252 @@
+"""The report as one self-contained page: verdict, figures beside their limits, pictures. It asks nothing of any network."""
+
+import importlib.resources
+import json
+from html import escape
+from pathlib import Path
+
+from weldsim import units
+from weldsim.output import write_whole
+from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
+from weldsim.report import figures
+from weldsim.report.limits import Check, ReportConfig, checks, verdict
+from weldsim.report.view import cross_section, error_lines
+
+STYLE = """
+:root{--ink:#1c2733;--soft:#66727f;--line:#e3e7eb;--good:#1b7f4b;--bad:#b3261e;--plain:#12355b}
+*{box-sizing:border-box}
+body{margin:0;background:#f3f5f7;color:var(--ink);font:15px/1.45 system-ui,"Segoe UI",Roboto,"Liberation Sans",sans-serif}
+main{max-width:1280px;margin:0 auto;padding:24px}
+header{display:flex;justify-content:space-between;align-items:center;gap:24px;margin-bottom:16px}
+h1{font-size:26px;margin:0}h2{font-size:17px;margin:0 0 10px}p{margin:4px 0;color:var(--soft)}
+.verdict{padding:10px 20px;border-radius:8px;color:#fff;font-weight:700;font-size:20px;white-space:nowrap}
+.good{background:var(--good)}.bad{background:var(--bad)}.plain{background:var(--plain)}
+.reasons{border-left:4px solid var(--bad);margin:0 0 16px;padding:10px 16px 10px 32px;background:#fff}
+.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(132px,1fr));gap:12px;margin-bottom:16px}
+.card,section{background:#fff;border:1px solid var(--line);border-radius:8px;padding:14px 16px}
+.card b{display:block;font-size:18px;white-space:nowrap}.card span{color:var(--soft);font-size:13px}
+section{margin-bottom:16px;overflow-x:auto}
+.two{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(520px,100%),1fr));gap:16px}
+.two{margin-bottom:16px}.two>section,section>.two{margin-bottom:0}
+table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
+th{text-align:left;color:var(--soft);font-weight:600;font-size:13px}
+th,td{padding:5px 10px 5px 0;border-bottom:1px solid var(--line);vertical-align:top}
+tr:last-child td{border-bottom:0}.num{white-space:nowrap}
+.mark{white-space:nowrap;font-weight:600}.mark.ok{color:var(--good)}.mark.no{color:var(--bad)}
+.bar{height:10px;background:#7d9bb8;border-radius:3px;min-width:2px}
+footer{color:var(--soft);font-size:13px;overflow-wrap:anywhere}
+"""
+# No address may be loaded, whatever a file name or a library slips in; plotly's shaders need eval and blobs.
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
+)
+DRAW = """
+for (const f of FIGURES) {
+  Plotly.newPlot(f.id, f.data, f.layout, {responsive: true, displaylogo: false, displayModeBar: "scene" in f.layout});
+}
+"""
+
+
+def write_html(
+    path: Path | str,
+    report: WeldReport,
+    cloud: PointCloud,
+    findings: SeamFindings,
+    paths: tuple[TorchPath, ...],
+    *,
+    log: ExecutionLog | None = None,
+    known: tuple[KnownSeam, ...] = (),
+    welded: int = 0,
+    joint_names: tuple[str, ...] = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3"),
+    config: ReportConfig | None = None,
+) -> Path:
+    """The page written, about 5 MB of it plotly.js. Raises OutputError.
+
+    Args:
+        path: the file to write.  report: figures and verdict.
+        cloud, findings, paths: what was seen, found and planned.
+        log: what the arm did along `paths[welded]`; adds speed and joints.
+        known: the true seams; adds the errors along the seam.
+        joint_names: in the order of the log's columns.
+        config: the limits the verdict was made with.
+    """
+    config = config or ReportConfig()
+    drawn: list[figures.Figure] = []
+    body = [_header(report, findings, config), _cards(report, findings), _checks(checks(report, config))]
+    body.append(_figure(drawn, "Cloud, seam and torch path", figures.scene(cloud, findings, paths, log, known)))
+    plots = _plots(drawn, cloud, findings, paths, log, known, welded, joint_names, config)
+    body.append(f'<div class="two">{"".join(plots)}</div>')
+    body.append(f'<div class="two">{_seams(findings)}{_refused(findings)}{_threshold(findings.threshold)}{_timing(report)}</div>')
+    body.append(_footer(report))
+    return write_whole(path, _page(report.scene, "".join(body), drawn))
+
+
+def _page(title: str, body: str, drawn: list[figures.Figure]) -> str:
+    plotly = (importlib.resources.files("plotly") / "package_data" / "plotly.min.js").read_text(encoding="utf-8")
+    data = json.dumps(drawn, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>weldsim: {escape(title)}</title>'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta name="viewport" content="width=device-width,initial-scale=1"><style>{STYLE}</style></head>'
+        f"<body><main>{body}</main><script>{plotly}</script><script>const FIGURES={data};{DRAW}</script></body></html>\n"
+    )
+
+
+def _plots(
+    drawn: list[figures.Figure],
+    cloud: PointCloud,
+    findings: SeamFindings,
+    paths: tuple[TorchPath, ...],
+    log: ExecutionLog | None,
+    known: tuple[KnownSeam, ...],
+    welded: int,
+    joint_names: tuple[str, ...],
+    config: ReportConfig,
+) -> list[str]:
+    """The two-column figures that there is data for."""
+    out = []
+    lines = error_lines(findings, paths, log, known, welded)
+    if lines:
+        out.append(_figure(drawn, "Error across the known seam", figures.errors_across(lines)))
+        out.append(_figure(drawn, "Cross-track distance", figures.errors_distance(lines, config)))
+    if welded < len(findings.seams):
+        seam = findings.seams[welded]
+        out.append(_figure(drawn, "Mean cross-section", figures.section(cross_section(cloud, seam))))
+        if seam.sigma is not None or seam.left_B is not None:
+            out.append(_figure(drawn, "Standard deviation and width along the seam", figures.uncertainty(seam)))
+    if log is not None and welded < len(paths):
+        speed = figures.torch_speed(log, paths[welded], config)
+        if speed is not None:
+            out.append(_figure(drawn, "Torch speed", speed))
+        out.append(_figure(drawn, "Joint angles", figures.joints(log, "q", joint_names)))
+        out.append(_figure(drawn, "Joint speeds", figures.joints(log, "qd", joint_names)))
+        if log.torque is not None:
+            out.append(_figure(drawn, "Joint torques", figures.joints(log, "torque", joint_names)))
+    return out
+
+
+def _figure(drawn: list[figures.Figure], title: str, figure: figures.Figure) -> str:
+    """A section that the page's script draws `figure` into."""
+    name = f"figure-{len(drawn) + 1}"
+    drawn.append({"id": name, **figure})
+    return f'<section><h2>{escape(title)}</h2><div id="{name}" style="height:{figure["layout"]["height"]}px"></div></section>'
+
+
+def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) -> str:
+    word, why = verdict(report, len(findings.seams), config)
+    look = "bad" if word == "FAILED" else "good" if word == "PASSED" else "plain"
+    listed = "" if report.passed else "".join(f"<li>{escape(reason)}</li>" for reason in report.reasons)
+    facts = f"{why}; method {report.method}, seed {report.seed}"
+    return (
+        f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"
+        f'<div class="verdict {look}">{escape(word)}</div></header>' + (f'<ul class="reasons">{listed}</ul>' if listed else "")
+    )
+
+
+def _cards(report: WeldReport, findings: SeamFindings) -> str:
+    """The handful of numbers that are read first."""
+    cards: list[tuple[str, str]] = [(str(len(findings.seams)), "seams found")]
+    if findings.seams:
+        seam = findings.seams[0]
+        cards += [
+            (f"{units.to_mm(seam.length):.1f} mm", "length"),
+            (f"{units.to_mm(seam.width):.1f} mm", "width of the opening"),
+            (f"{seam.confidence:.2f}", "confidence"),
+        ]
+        if seam.sigma is not None:
+            cards.append((f"{units.to_mm(float(seam.sigma.mean())):.2f} mm", "sigma across, mean"))
+    for name, error in (("plan", report.plan), ("executed", report.executed)):
+        if error is not None:
+            text = f"{units.to_mm(error.mean):.2f} / {units.to_mm(error.p95):.2f} mm"
+            cards.append((text, f"{name}, mean / p95 from the {error.reference}"))
+    if report.timing:
+        cards.append((f"{sum(report.timing.values()):.2f} s", "all stages"))
+    return (
+        '<div class="cards">'
+        + "".join(f'<div class="card"><b>{escape(a)}</b><span>{escape(b)}</span></div>' for a, b in cards)
+        + "</div>"
+    )
+
+
+def _checks(listed: tuple[Check, ...]) -> str:
+    if not listed:
+        return ""
+    marks = {True: '<td class="mark ok">kept</td>', False: '<td class="mark no">exceeded</td>', None: "<td></td>"}
+    rows = []
+    for c in listed:
+        figure = f'<td>{escape(c.figure)}</td><td class="num">{escape(c.value)}</td><td class="num">{escape(c.limit)}</td>'
+        rows.append(f"<tr>{figure}{marks[c.passed]}</tr>")
+    half = -(-len(rows) // 2)
+    tables = "".join(_table(("figure", "value", "limit", ""), part) for part in (rows[:half], rows[half:]) if part)
+    return f'<section><h2>Figures and limits</h2><div class="two">{tables}</div></section>'
+
+
+def _seams(findings: SeamFindings) -> str:
+    rows = [
+        f"<tr><td>{i}</td><td>{escape(seam.joint)}, {escape(seam.reference)}</td>"
+        + "".join(
+            f'<td class="num">{text}</td>'
+            for text in (
+                f"{units.to_mm(seam.length):.1f} mm",
+                f"{units.to_mm(seam.width):.1f} mm",
+                "" if seam.depth is None else f"{units.to_mm(seam.depth):.1f} mm",
+                f"{units.to_mm(seam.residual):.2f} mm",
+                f"{seam.confidence:.2f}",
+            )
+        )
+        + "</tr>"
+        for i, seam in enumerate(findings.seams, 1)
+    ]
+    return _section(
+        "Seams", ("", "joint, reference", "length", "width", "depth", "residual", "confidence"), rows, "None was found."
+    )
+
+
+def _refused(findings: SeamFindings) -> str:
+    rows = []
+    for r in findings.rejected:
+        where = ", ".join(f"{units.to_mm(v):.0f}" for v in r.position_B)
+        rows.append(
+            f'<tr><td class="num">{units.to_mm(r.length):.0f} mm</td><td class="num">{where}</td><td>{escape(r.reason)}</td></tr>'
+        )
+    return _section("Candidates refused", ("length", "at x, y, z [mm]", "reason"), rows, "There were none.")
+
+
+def _threshold(threshold: Threshold | None) -> str:
+    """The detection threshold and how far the answer moves with it."""
+    if threshold is None:
+        return ""
+    rows = []
+    for factor, move in threshold.stability.items():
+        text = f"{units.to_mm(move):.3f} mm" if move < float("inf") else "seam lost"
+        rows.append(f'<tr><td class="num">x {escape(factor)}</td><td class="num">{text}</td></tr>')
+    scale, unit = (1e3, "mm") if threshold.unit == "m" else (1.0, threshold.unit)
+    value, noise = (f"{scale * number:.3g} {unit}".strip() for number in (threshold.value, threshold.noise))
+    note = escape(f"{threshold.name}: {value}, chosen from the cloud's own noise of {noise}.")
+    return _section("Threshold", ("threshold", "greatest movement of the centre line"), rows, "", note)
+
+
+def _timing(report: WeldReport) -> str:
+    most = max(report.timing.values(), default=0.0)
+    rows = [
+        f'<tr><td>{escape(stage)}</td><td class="num">{1e3 * seconds:.0f} ms</td>'
+        f'<td style="width:55%"><div class="bar" style="width:{100 * seconds / most if most else 0:.1f}%"></div></td></tr>'
+        for stage, seconds in report.timing.items()
+    ]
+    return _section("Run times", ("stage", "time", ""), rows, "") if rows else ""
+
+
+def _section(title: str, head: tuple[str, ...], rows: list[str], empty: str, note: str = "") -> str:
+    body = _table(head, rows) if rows else f"<p>{escape(empty)}</p>"
+    return f"<section><h2>{escape(title)}</h2>{f'<p>{note}</p>' if note else ''}{body}</section>"
+
+
+def _table(head: tuple[str, ...], rows: list[str]) -> str:
+    cells = "".join(f"<th>{escape(name)}</th>" for name in head)
+    return f"<table><thead><tr>{cells}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _footer(report: WeldReport) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in report.versions.items())
+    digest = f"config {report.config_digest}. " if report.config_digest else ""
+    return f"<footer>{escape(digest)}{escape(versions)}</footer>"
