@@ -52,10 +52,10 @@ class GlRenderer(Renderer):
         mujoco.mjv_updateScene(self._model, data, self._option, None, mujoco.MjvCamera(), int(everything), self._scene)
         _set_frustum(self._scene, X_WC, intrinsics)
         rect = mujoco.MjrRect(0, 0, w, h)
+        picture = self._colour(drawing, rect) if colour else None
         z, geom = np.full((h, w), np.nan, np.float32), np.full((h, w), -1, np.int32)
         if depth:
             z, geom = self._depth_and_geom(drawing, rect)
-        picture = self._colour(drawing, rect) if colour else None
         return Render(depth=z, geom=geom, colour=picture)
 
     def _depth_and_geom(

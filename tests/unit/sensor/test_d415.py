@@ -1,0 +1,245 @@
+"""The parametric D415 reproduces the figures of a simulated stereo pair with window matching.
+
+Exact depth is in closed form (a plane, a groove, a fillet, a step), so that only the model is under test. The targets are
+those of stereo matching on rendered infrared pairs at the same distances; several seeds each.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy import ndarray
+
+from tests.depth_scenes import FLAT, fillet, points_in_part, profile_depth, v_groove
+from weldsim.errors import ConfigError, RecordError
+from weldsim.mounts import D415_640X480
+from weldsim.records import CameraIntrinsics
+from weldsim.sensor.d415 import D415_1280X720, D415Config, d415
+
+SEEDS = range(4)
+FINE = D415Config(depth_unit=1e-4)  # the model's own figures, not those of the millimetre steps
+SMOOTH = D415Config(depth_unit=0.0, disparity_step=0.0)
+FB = D415_640X480.fx * 0.055
+THESIS_DISTANCES = [0.360, 0.391, 0.408, 0.428, 0.457, 0.501, 0.519, 0.530, 0.560, 0.605]  # [m]
+
+
+def middle(image: ndarray) -> ndarray:
+    """Away from the borders and the blind band on the left."""
+    return image[20:-20, 130:-20]
+
+
+@pytest.mark.parametrize("z", [0.36, 0.42, 0.48, 0.54, 0.60])
+def test_plane_noise_follows_the_makers_law(z: float) -> None:
+    """Standard deviation of depth on a plane: z^2 * 0.08 px / (f B), within 25 %."""
+    exact = profile_depth(D415_640X480, FLAT, z, tilt=0.1)
+    sigma = [np.nanstd(middle(d415(exact, D415_640X480, FINE, seed=[seed]) - exact)) for seed in SEEDS]
+    assert np.mean(sigma) == pytest.approx(z**2 * 0.08 / FB, rel=0.25)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_noise_is_alike_over_five_pixels(axis: int) -> None:
+    """Correlation falls to 1/e at 4.5 to 6 px along rows and columns."""
+    exact = profile_depth(D415_640X480, FLAT, 0.45)
+    correlation = np.zeros(12)
+    for seed in SEEDS:
+        error = FB / d415(exact, D415_640X480, SMOOTH, seed=[seed]) - FB / exact
+        error = np.moveaxis(middle(error - np.nanmean(error)), axis, 0)
+        correlation += [np.mean(error[: len(error) - lag] * error[lag:]) for lag in range(12)]
+    correlation /= correlation[0]
+    assert 4.5 <= np.interp(-np.exp(-1), -correlation, np.arange(12)) <= 6.0
+
+
+def groove_profile(
+    intrinsics: CameraIntrinsics, config: D415Config, z: float, rotation: float, seed: int
+) -> tuple[ndarray, ndarray]:
+    """Mean and standard deviation of height [m] in 1 mm strips along a 6 x 5 mm V, from 30 mm left of it to 30 mm right."""
+    exact = profile_depth(intrinsics, v_groove(0.006, 0.005), z, rotation=rotation)
+    depth = d415(exact, intrinsics, config, seed=[seed])
+    across = points_in_part(intrinsics, exact, z, rotation=rotation)[..., 0]
+    height = points_in_part(intrinsics, depth, z, rotation=rotation)[..., 2]
+    seen = np.isfinite(depth)
+    strips = [height[seen & (np.abs(across - x) < 0.5e-3)] for x in np.arange(-30, 31) * 1e-3]
+    return np.array([s.mean() for s in strips]), np.array([s.std() for s in strips])
+
+
+@pytest.mark.parametrize("rotation", [0.0, 0.6, np.pi / 2])
+@pytest.mark.parametrize(
+    ("intrinsics", "z", "shallowest", "deepest"),
+    [(D415_640X480, 0.40, 1.9e-3, 2.9e-3), (D415_1280X720, 0.45, 2.5e-3, 3.3e-3)],
+    ids=["640x480", "1280x720"],
+)
+def test_a_small_groove_is_rounded_off(
+    intrinsics: CameraIntrinsics, z: float, shallowest: float, deepest: float, rotation: float
+) -> None:
+    """The 5 mm deep V looks 1.9 to 2.9 mm deep at 640 x 480 and 0.40 m, and is noisier than the plate."""
+    profiles = [groove_profile(intrinsics, FINE, z, rotation, seed) for seed in SEEDS]
+    mean, sigma = np.mean([m for m, _ in profiles], axis=0), np.mean([s for _, s in profiles], axis=0)
+    assert shallowest <= -mean.min() <= deepest
+    assert abs(mean[:15].mean()) < 0.15e-3  # pixel locking shifts a frontal plate by up to 0.1 mm
+    if intrinsics is D415_640X480:
+        assert 1.7 <= sigma[28:33].mean() / sigma[:15].mean() <= 2.3
+
+
+@pytest.mark.parametrize(
+    ("intrinsics", "z", "low", "high"),
+    [(D415_640X480, 0.35, 0.5e-3, 0.8e-3), (D415_640X480, 0.40, 0.7e-3, 1.1e-3), (D415_1280X720, 0.45, 0.45e-3, 0.7e-3)],
+    ids=["0.35", "0.40", "720p"],
+)
+def test_slice_centroids_scatter_as_in_stereo(intrinsics: CameraIntrinsics, z: float, low: float, high: float) -> None:
+    """Centroid of what lies under the plate, in 2 mm slices along a 6 x 5 mm V, with millimetre steps."""
+    exact = profile_depth(intrinsics, v_groove(0.006, 0.005), z)
+    centroids = []
+    for seed in SEEDS:
+        depth = d415(exact, intrinsics, D415Config(), seed=[seed])
+        points = points_in_part(intrinsics, depth, z)
+        near = np.isfinite(depth) & (np.abs(points[..., 0]) < 8e-3)
+        x, y, below = points[near][:, 0], points[near][:, 1], np.clip(-points[near][:, 2], 0, None)
+        for start in np.arange(-0.06, 0.06, 0.002):
+            strip = (y >= start) & (y < start + 0.002)
+            centroids.append(np.average(x[strip], weights=below[strip]))
+    assert low <= np.std(centroids) <= high
+    assert abs(np.mean(centroids)) < 0.3e-3
+
+
+def test_a_fillet_corner_is_raised_but_its_planes_are_true() -> None:
+    """Two plates at 90 deg, 1280 x 720 at 0.45 m: the corner seems 0.9 to 1.4 mm nearer, as the mean over the window is;
+    fitted planes meet within 0.1 mm of it."""
+    z, corner, crossing = 0.45, [], []
+    exact = profile_depth(D415_1280X720, fillet(), z)
+    across = np.abs(points_in_part(D415_1280X720, exact, z)[..., 0])
+    for seed in SEEDS:
+        depth = d415(exact, D415_1280X720, FINE, seed=[seed])
+        points = points_in_part(D415_1280X720, depth, z)
+        corner.append(np.nanmean(points[..., 2][across < 0.4e-3]))
+        x, y, height = points[np.isfinite(depth)].T
+        for start in np.arange(-0.05, 0.05, 0.01):
+            strip = (y >= start) & (y < start + 0.01)
+            left, right = (
+                np.polyfit(x[s], height[s], 1) for s in (strip & (x < -8e-3) & (x > -4e-2), strip & (x > 8e-3) & (x < 4e-2))
+            )
+            meet = (right[1] - left[1]) / (left[0] - right[0])
+            crossing.append((meet, left[0] * meet + left[1]))
+    assert 0.9e-3 <= np.mean(corner) <= 1.4e-3
+    assert (np.abs(np.mean(crossing, axis=0)) < 0.1e-3).all()
+    assert (np.std(crossing, axis=0) < 0.35e-3).all()
+
+
+@pytest.mark.parametrize("z", [0.35, 0.45, 0.55])
+def test_the_left_band_is_blind(z: float) -> None:
+    """The right imager does not see the first f B / z columns."""
+    depth = d415(profile_depth(D415_640X480, FLAT, z), D415_640X480, D415Config(), seed=[0])
+    first = np.isfinite(depth).argmax(axis=1)
+    assert np.abs(first - FB / z).max() <= 3
+    assert np.isfinite(depth[:, first.max() :]).all()
+
+
+def test_nothing_is_seen_nearer_than_the_search_range() -> None:
+    exact = profile_depth(D415_640X480, FLAT, 0.30, tilt=0.5)
+    depth = d415(exact, D415_640X480, D415Config(), seed=[1])
+    nearest = FB / 126
+    assert np.nanmin(exact) < nearest < np.nanmin(depth) + 0.5e-3
+    assert np.isnan(depth[exact < nearest - 2e-3]).all()
+    assert np.isfinite(depth[exact > nearest + 2e-3]).mean() > 0.8
+
+
+def test_plane_means_are_true_without_a_view_offset() -> None:
+    """At the thesis's ten distances, within 0.2 mm."""
+    for seed, z in enumerate(THESIS_DISTANCES):
+        exact = profile_depth(D415_640X480, FLAT, z, tilt=0.05)
+        assert abs(np.nanmean(d415(exact, D415_640X480, D415Config(), seed=[seed]) - exact)) < 0.2e-3
+
+
+def test_view_offsets_scatter_as_the_thesis_distances_do() -> None:
+    """With 3.5 mm the rms error of ten mean distances lies in 2 to 5 mm for nearly every unit; the thesis has 3.5 mm."""
+    small = CameraIntrinsics(width=160, height=60, fx=D415_640X480.fx, fy=D415_640X480.fy, cx=20.0, cy=30.0)
+    config = replace(D415Config(), offset_sigma=3.5e-3)
+    rms = []
+    for unit in range(20):
+        errors = []
+        for view, z in enumerate(THESIS_DISTANCES):
+            exact = profile_depth(small, FLAT, z)
+            errors.append(np.nanmean(d415(exact, small, config, seed=[unit, view]) - exact))
+        rms.append(np.sqrt(np.mean(np.square(errors))))
+        assert (np.abs(errors) < 0.02 * np.array(THESIS_DISTANCES) + 0.5e-3).all()
+    assert np.mean((np.array(rms) > 2e-3) & (np.array(rms) < 5e-3)) >= 0.8
+
+
+def test_part_of_the_noise_changes_between_exposures() -> None:
+    exact = profile_depth(D415_640X480, FLAT, 0.45)
+    frames = np.array([middle(d415(exact, D415_640X480, SMOOTH, seed=[3], exposure=k)) for k in range(6)])
+    total, temporal = np.nanstd(frames - middle(exact)), np.nanmean(np.nanstd(frames, axis=0, ddof=1))
+    assert temporal / total == pytest.approx(0.3, abs=0.05)
+    still = replace(SMOOTH, temporal_fraction=0.0)
+    again = [d415(exact, D415_640X480, still, seed=[3], exposure=k) for k in (0, 1)]
+    assert np.array_equal(*again, equal_nan=True)
+
+
+def step_scene(step: float, *, near: float = 0.40, column: int = 330) -> ndarray:
+    """A frontal plane [m] whose right part, from `column` on, lies `step` nearer."""
+    exact = np.full((480, 640), near + step, np.float32)
+    exact[:, column:] = near
+    return exact
+
+
+def test_a_large_step_leaves_a_shadow_on_its_left_and_nothing_between() -> None:
+    """40 mm: two clean surfaces, the far one blind for as many pixels as the disparities differ."""
+    exact = step_scene(0.040)
+    depth = d415(exact, D415_640X480, D415Config(), seed=[2])
+    between = (depth > 0.40 + 5e-3) & (depth < 0.44 - 5e-3)
+    assert between.mean() < 1e-5
+    shadow = FB / 0.40 - FB / 0.44
+    blind = np.isnan(depth[:, 330 - 20 : 330]).sum(axis=1)
+    assert abs(np.median(blind) - shadow) <= 2
+    assert np.isfinite(depth[:, 340:]).all()
+    assert np.isfinite(depth[:, 130:300]).all()
+
+
+def test_a_small_step_is_smeared_over_the_window() -> None:
+    """10 mm is a disparity step of 2 px: the mean depth passes through the middle and nothing is lost."""
+    exact = step_scene(0.010)
+    depth = d415(exact, D415_640X480, FINE, seed=[2])
+    assert np.isfinite(depth[:, 130:]).all()
+    profile = depth.mean(axis=0) - 0.40
+    assert 3e-3 < profile[329:331].mean() < 7e-3
+    assert profile[336 + 3 :].mean() == pytest.approx(0, abs=0.2e-3)
+    assert profile[200 : 324 - 3].mean() == pytest.approx(0.010, abs=0.2e-3)
+
+
+def test_units_and_views_differ_and_repeat() -> None:
+    exact = profile_depth(D415_640X480, FLAT, 0.45)
+    first, again, other = (d415(exact, D415_640X480, D415Config(), seed=[s]) for s in (5, 5, 6))
+    assert first.tobytes() == again.tobytes()
+    assert (first != other).mean() > 0.3
+
+
+def test_dark_and_shiny_parts_have_holes_and_the_rest_has_not() -> None:
+    exact = profile_depth(D415_640X480, FLAT, 0.45)
+    part = np.zeros(exact.shape, bool)
+    part[:, 320:] = True
+    holes = [
+        np.isnan(d415(exact, D415_640X480, D415Config(material=m), seed=[1], part=part))[:, 320:].mean()
+        for m in ("matte", "mill_scale", "ground", "black")
+    ]
+    assert holes == sorted(holes)
+    assert holes[0] == 0 < holes[1]
+    black = d415(exact, D415_640X480, D415Config(material="black"), seed=[1], part=part)
+    assert np.isfinite(black[:, 130:320]).all()
+
+
+def test_an_empty_view_gives_an_empty_image() -> None:
+    nothing = np.full((480, 640), np.nan, np.float32)
+    assert np.isnan(d415(nothing, D415_640X480, D415Config(offset_sigma=1e-3), seed=[0])).all()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("baseline", 0.0), ("window", -1), ("disparity_sigma", -0.1), ("temporal_fraction", 1.5)],
+)
+def test_impossible_figures_are_refused(key: str, value: float) -> None:
+    with pytest.raises(ConfigError, match=key):
+        D415Config(**{key: value})
+
+
+def test_a_depth_image_of_another_size_is_refused() -> None:
+    with pytest.raises(RecordError, match=r"640.*|shape"):
+        d415(np.ones((10, 10), np.float32), D415_640X480, D415Config(), seed=[0])
