@@ -14,6 +14,7 @@ from weldsim.frames import Transform
 from weldsim.kinematics import torch_pose
 from weldsim.motion.arm import TORCH_SITE
 from weldsim.motion.config import MotionConfig
+from weldsim.motion.posture import Blocked
 from weldsim.motion.rail import Rail
 from weldsim.records import Segment
 
@@ -22,6 +23,7 @@ DAMPING = 1e-10
 ITERATIONS = 40
 SETTLED = 1e-7  # [rad] a smaller step ends the iteration
 HALVINGS = 5
+LOOK = 0.005  # [m] between collision checks along a piece
 
 
 class LostPathError(MotionError):
@@ -151,6 +153,16 @@ def _follow_piece(
         extra = np.stack([solver.at(X_BT[k], spline(middle[k]), float(middle[k])) for k in range(len(middle))])
         order = np.argsort(np.concatenate([s, middle]))
         s, q = np.concatenate([s, middle])[order], np.concatenate([q, extra])[order]
+
+
+def check_clear(paths: list[JointPath], blocked: Blocked) -> None:
+    """Raises LostPathError at the first configuration, LOOK apart, that touches something."""
+    for path in paths:
+        start, end = float(path.spline.x[0]), float(path.spline.x[-1])
+        for s in np.linspace(start, end, max(2, int(np.ceil((end - start) / LOOK)) + 1)):
+            touch = blocked(path.spline(s))
+            if touch is not None:
+                raise LostPathError(f"s = {1e3 * s:.1f} mm: {touch}", s=float(s), reason=touch)
 
 
 def _strayed(

@@ -9,12 +9,13 @@ from numpy import ndarray
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
+from weldsim.motion.air import air_moves
 from weldsim.motion.arm import kinematic_model
 from weldsim.motion.config import MotionConfig
-from weldsim.motion.follow import JointPath, LostPathError, follow
+from weldsim.motion.follow import JointPath, LostPathError, check_clear, follow
 from weldsim.motion.posture import Blocked, Posture, find_postures, unreachable
 from weldsim.motion.rail import Rail, make_rail
-from weldsim.motion.timing import Move, air_move, piece_move
+from weldsim.motion.timing import Move, piece_move
 from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import JointTrajectory, Segment, TorchPath
 
@@ -56,7 +57,8 @@ def plan_motion(
         path: torch poses; leads are added along the wire where it has none.
         q_start: joint angles at t = 0 [rad].
         X_FT: flange to torch tip.
-        blocked: names what a configuration touches, or None; postures that touch anything are not used.
+        blocked: names what a configuration touches, or None (`CellCollision`); nothing planned then touches anything, as
+            far as samples of the motion show. Without it only the arm's centre lines are kept clear of table and torch.
     Raises:
         UnreachableError: a pose no posture reaches; `data`: index, s, position, distance, reach.
         MotionError: reachable pose by pose, but in no single sweep of the arm; `data`: index, s, reason.
@@ -67,12 +69,7 @@ def plan_motion(
             f"start: joint {int(np.abs(q_start).argmax()) + 1} is beyond +-360 deg", joint=int(np.abs(q_start).argmax())
         )
     rail = make_rail(path, config)
-    posture, paths = _first_that_holds(rail, find_postures(rail, q_start, X_FT, config, blocked), X_FT, config)
-    moves = [piece_move(rail, piece, config) for piece in paths]
-    first, last = moves[0], moves[-1]
-    moves.insert(0, air_move(q_start, first.q[0], float(first.s[0]), config))
-    if config.return_home:
-        moves.append(air_move(last.q[-1], q_start, float(last.s[-1]), config))
+    posture, paths, moves = _first_that_holds(rail, q_start, X_FT, config, blocked)
     slowest = min(move.slowest for move in moves if move.segment == Segment.WELD)
     notes = []
     if slowest < 0.999:
@@ -95,16 +92,12 @@ def plan_motion(
 
 
 def _first_that_holds(
-    rail: Rail, postures: list[Posture], X_FT: Transform, config: MotionConfig
-) -> tuple[Posture, list[JointPath]]:
-    """The best posture that can be followed all along, and its joint paths."""
-    model = kinematic_model(X_FT)
-    lost: list[LostPathError] = []
-    for posture in postures[: config.candidates]:
-        try:
-            return posture, follow(rail, posture.q[0], posture.q.mean(axis=0), model, X_FT, config)
-        except LostPathError as error:
-            lost.append(error)
+    rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
+) -> tuple[Posture, list[JointPath], list[Move]]:
+    """The best posture that can be followed all along and reached through the air, with its joint paths and moves."""
+    postures = find_postures(rail, q_start, X_FT, config, blocked)
+    if blocked is not None and (touch := blocked(q_start)) is not None:
+        raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch)
     if not postures:
         raise MotionError(
             "path: every pose can be reached, but no posture of the arm sweeps the whole path without changing branch or touching"
@@ -113,16 +106,38 @@ def _first_that_holds(
             s=rail.start,
             reason="no posture",
         )
+    model = kinematic_model(X_FT)
+    lost: list[LostPathError] = []
+    for posture in postures[: config.candidates]:
+        try:
+            paths = follow(rail, posture.q[0], posture.q.mean(axis=0), model, X_FT, config)
+            if blocked is not None:
+                check_clear(paths, blocked)
+            return posture, paths, _moves(rail, paths, q_start, X_FT, config, blocked)
+        except LostPathError as error:
+            lost.append(error)
     furthest = max(lost, key=lambda error: float(str(error.data["s"])))
     s, reason = float(str(furthest.data["s"])), str(furthest.data["reason"])
     if reason == "out of reach":
         raise unreachable(rail, s, "the arm cannot follow the path to here in any posture") from furthest
-    raise MotionError(
-        f"path pose {rail.path_index(s)}: no posture follows the path beyond {furthest}",
-        index=rail.path_index(s),
-        s=s,
-        reason=reason,
-    ) from furthest
+    index = rail.path_index(s)
+    raise MotionError(f"path pose {index}: no posture gets further than {furthest}", index=index, s=s, reason=reason) from furthest
+
+
+def _moves(
+    rail: Rail,
+    paths: list[JointPath],
+    q_start: Float[ndarray, "6"],
+    X_FT: Transform,
+    config: MotionConfig,
+    blocked: Blocked | None,
+) -> list[Move]:
+    """Air, lead-in, weld, lead-out, air."""
+    moves = [piece_move(rail, piece, config) for piece in paths]
+    first, last = moves[0], moves[-1]
+    there = air_moves(q_start, first.q[0], float(first.s[0]), X_FT, config, blocked)
+    home = air_moves(q_start, last.q[-1], float(last.s[-1]), X_FT, config, blocked, back=True) if config.return_home else []
+    return [*there, *moves, *home]
 
 
 def _join(moves: list[Move], path: TorchPath, rail: Rail, config: MotionConfig) -> JointTrajectory:

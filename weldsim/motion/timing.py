@@ -63,7 +63,7 @@ def air_move(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config:
     trajectory = _solve(ruckig.Ruckig(6), request, 6, "air move")
     n = int(np.ceil(trajectory.duration / config.period - 1e-9)) + 1
     q, qd, qdd = np.moveaxis(_sample(trajectory, 0.0, config.period, n), 1, 0)
-    # Once held, ruckig repeats the last speed and acceleration, which are zero only to rounding.
+    # The last sample, and past the end, ruckig's speed and acceleration are zero only to rounding.
     qd[-1], qdd[-1] = 0.0, 0.0
     return Move(segment=Segment.AIR, q=q, qd=qd, qdd=qdd, s=np.full(n, s), speed=np.zeros(n))
 

@@ -1,0 +1,70 @@
+"""Moves through the air between the start configuration and the rail, straight in joint space or over a lifted point."""
+
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.errors import UnreachableError
+from weldsim.frames import Transform
+from weldsim.kinematics import JOINT_LIMIT, inverse_near, torch_pose
+from weldsim.motion.config import MotionConfig
+from weldsim.motion.follow import LostPathError
+from weldsim.motion.posture import HOP, Blocked
+from weldsim.motion.timing import Move, air_move
+
+LIFTS = (0.0, 0.1, 0.2, 0.3)  # [m] how far back along the wire a detour begins, tried in order
+STEP = 0.02  # [rad] of the fastest joint between collision checks
+
+
+def air_moves(
+    q_home: Float[ndarray, "6"],
+    q_rail: Float[ndarray, "6"],
+    s: float,
+    X_FT: Transform,
+    config: MotionConfig,
+    blocked: Blocked | None,
+    back: bool = False,
+) -> list[Move]:
+    """The moves from q_home to q_rail, or the other way with `back`, that touch nothing.
+
+    A straight joint move if it is clear; else one that stops at a point lifted off the rail along the wire.
+
+    Raises:
+        LostPathError: neither is clear; `data`: s, reason.
+    """
+    touch: str | None = None
+    for lift in LIFTS:
+        stops = [q_home, q_rail]
+        if lift > 0:
+            lifted = _lifted(q_rail, lift, X_FT)
+            if lifted is None:
+                continue
+            stops.insert(1, lifted)
+        if back:
+            stops.reverse()
+        found = next((t for a, b in pairwise(stops) if (t := _touched(a, b, blocked)) is not None), None)
+        if found is None:
+            return [air_move(a, b, s, config) for a, b in pairwise(stops)]
+        touch = touch or found
+    raise LostPathError(f"the air move {'home' if back else 'to the weld'}: {touch}", s=s, reason=f"{touch}")
+
+
+def _lifted(q: Float[ndarray, "6"], lift: float, X_FT: Transform) -> Float[ndarray, "6"] | None:
+    """Joint angles with the torch `lift` [m] back along the wire, in the same branch; None where there are none."""
+    X_BT = torch_pose(q, X_FT)
+    try:
+        lifted = inverse_near(Transform("BT", X_BT.R, X_BT.p - lift * X_BT.R[:, 2]) @ X_FT.inverse(), q)
+    except UnreachableError:
+        return None
+    return lifted if np.abs(lifted - q).max() < HOP and np.abs(lifted).max() <= JOINT_LIMIT else None
+
+
+def _touched(a: Float[ndarray, "6"], b: Float[ndarray, "6"], blocked: Blocked | None) -> str | None:
+    """What the straight joint move from a to b touches first, or None."""
+    if blocked is None:
+        return None
+    n = int(np.ceil(np.abs(b - a).max() / STEP))
+    looks = a + np.linspace(0.0, 1.0, n + 2)[:, None] * (b - a)
+    return next((touch for q in looks if (touch := blocked(q)) is not None), None)
