@@ -101,3 +101,23 @@ def test_wire_points_down_into_the_work(real_data):
     sent = np.loadtxt(real_data / "thesis_paths" / "ur_y_shape.csv", delimiter=",")
     X_BT = Transform.from_rotation_vector("BF", sent[:, 3:], sent[:, :3]) @ mounts.X_FT
     assert (X_BT.R[:, 2, 2] < -0.3).all()  # its seam slopes by 38 deg
+
+
+@pytest.mark.parametrize("camera", ["d415", "kinect"])
+def test_mujoco_cameras_are_optical_frames_turned_half_a_turn_about_x(world, camera):
+    q = np.array([0.3, -1.6, -1.8, -1.2, 1.4, 0.2])
+    data = world.new_data(q)
+    X_BC = flange_pose(q) @ mounts.X_FC if camera == "d415" else mounts.X_WB.inverse() @ mounts.X_WC_KINECT
+    X_WC = mounts.X_WB @ X_BC
+    found = data.cam(camera)
+    np.testing.assert_allclose(found.xpos, X_WC.p, atol=1e-6)
+    np.testing.assert_allclose(found.xmat.reshape(3, 3) @ np.diag([1.0, -1.0, -1.0]), X_WC.R, atol=1e-6)
+
+
+def test_part_has_z_out_of_the_surface_and_x_along_travel(world):
+    curve = world.workpiece.seam_curves()[0]
+    travel = curve.opening[-1] - curve.opening[0]
+    assert travel[0] > 0.9 * np.linalg.norm(travel)
+    assert (curve.bisectors[:, 2] < -0.9).all()
+    np.testing.assert_allclose(curve.opening[:, 2], 0, atol=1e-9)
+    assert world.workpiece.build_mesh().vertices[:, 2].max() == pytest.approx(0, abs=1e-9)
