@@ -1,6 +1,6 @@
 """The interactive figures of the report page, as plain plotly figure dictionaries ({"data", "layout"}), lengths in millimetres.
 
-Plain dictionaries because plotly's own figure classes take over a second to load; the tests validate each against them.
+Plain dictionaries, so that writing a page needs plotly's script alone; the tests check each with plotly's own classes.
 """
 
 import base64
@@ -14,7 +14,7 @@ from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindi
 from weldsim.report.limits import ReportConfig
 from weldsim.report.style import CENTRE, GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
-from weldsim.report.view import CrossSection, ErrorLine, height_range, shown, torch_axes, view_frame
+from weldsim.report.view import CrossSection, ErrorLine, height_range, heights, shown, torch_axes, view_frame
 
 Figure = dict[str, Any]
 CLOUD_LIMIT = 60_000  # points drawn
@@ -33,9 +33,9 @@ def scene(
     index = shown(cloud, findings.seams, CLOUD_LIMIT)
     inside = findings.region[index] > 0 if len(findings.region) == len(cloud) else np.zeros(len(index), bool)
     points, groove = cloud.points[index[~inside]], cloud.points[index[inside]]
-    heights = X_BS.inverse().points(points)[:, 2]
-    low, high = height_range(heights)
-    colour = {"color": _array(1e3 * heights), "colorscale": "Cividis", "cmin": 1e3 * low, "cmax": 1e3 * high}
+    height = heights(points, findings.seams, X_BS)
+    low, high = height_range(height, findings.seams)
+    colour = {"color": _array(1e3 * height), "colorscale": "Cividis", "cmin": 1e3 * low, "cmax": 1e3 * high}
     bar = {"title": {"text": "height [mm]", "side": "right"}, "thickness": 12, "len": 0.6, "x": 1.0, "outlinewidth": 0}
     data = [_dots("cloud", points, {"size": 2.2, **colour, "colorbar": bar})]
     if len(groove):
@@ -61,7 +61,7 @@ def scene(
         "scene": {
             **{f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}} for name in "xyz"},
             "aspectmode": "data",
-            "camera": {"eye": _xyz(1.1 * eye), "up": _xyz(X_BS.R[:, 2])},
+            "camera": {"eye": _xyz((1.1 if findings.seams else 1.4) * eye), "up": _xyz(X_BS.R[:, 2])},
         },
         "margin": {"l": 0, "r": 0, "t": 8, "b": 0},
         "legend": {"orientation": "h", "y": 0.01, "x": 0.01, "bgcolor": "rgba(255,255,255,0.8)", "itemsizing": "constant"},

@@ -4,6 +4,7 @@ Imports matplotlib: import this module where a picture is asked for, not before.
 """
 
 import io
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import ReportConfig, verdict
 from weldsim.report.style import BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
-from weldsim.report.view import MARGIN, CrossSection, cross_section, error_lines, height_range, torch_axes, view_frame
+from weldsim.report.view import MARGIN, CrossSection, cross_section, error_lines, height_range, heights, torch_axes, view_frame
 
 EMPTY = "#eef1f4"
 OBLIQUE = np.array([0.25, 0.55])
@@ -75,12 +76,14 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
 
 def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFindings, paths: tuple[TorchPath, ...]) -> None:
     """The cloud as heights over the parent surface, seen along its normal, with lips, centre line and wires."""
-    X_SB = view_frame(cloud, findings.seams).inverse()
+    X_BS = view_frame(cloud, findings.seams)
+    X_SB = X_BS.inverse()
     points = X_SB.points(cloud.points)
     window = _window(points, [X_SB.points(seam.points_B) for seam in findings.seams])
-    points = points[((points[:, :2] >= window[0]) & (points[:, :2] <= window[1])).all(axis=1)]
-    image, extent = _height_image(points)
-    low, high = height_range(points[:, 2])
+    seen = ((points[:, :2] >= window[0]) & (points[:, :2] <= window[1])).all(axis=1)
+    height = heights(cloud.points[seen], findings.seams, X_BS)
+    image, extent = _height_image(points[seen, :2], height)
+    low, high = height_range(height, findings.seams)
     drawn = axes.imshow(
         1e3 * image, extent=extent, origin="lower", cmap="cividis", vmin=1e3 * low, vmax=1e3 * high, interpolation="nearest"
     )
@@ -127,16 +130,16 @@ def _trace(axes: Axes, X_SB: Transform, points_B: ndarray, colour: str, width: f
     axes.plot(x, y, style, color=colour, lw=width, label=label)
 
 
-def _height_image(points_S: ndarray) -> tuple[ndarray, tuple[float, float, float, float]]:
+def _height_image(places: ndarray, height: ndarray) -> tuple[ndarray, tuple[float, float, float, float]]:
     """Mean height of each pixel [m], NaN where the cloud has none, and its extent [mm]."""
-    low, high = points_S[:, :2].min(axis=0), points_S[:, :2].max(axis=0)
+    low, high = places.min(axis=0), places.max(axis=0)
     # A sparse cloud gets larger pixels, so that it still covers the picture.
-    pixel = max(PIXEL, float(np.sqrt(5 * np.prod(high - low) / len(points_S))))
+    pixel = max(PIXEL, float(np.sqrt(5 * np.prod(high - low) / len(places))))
     shape = np.maximum(1, np.ceil((high - low) / pixel).astype(int))
-    column, row = np.minimum(((points_S[:, :2] - low) / pixel).astype(int), shape - 1).T
+    column, row = np.minimum(((places - low) / pixel).astype(int), shape - 1).T
     flat = row * shape[0] + column
     count = np.bincount(flat, minlength=shape.prod())
-    total = np.bincount(flat, points_S[:, 2], minlength=shape.prod())
+    total = np.bincount(flat, height, minlength=shape.prod())
     image = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape[1], shape[0])
     edge = low + shape * pixel
     return image, (1e3 * low[0], 1e3 * edge[0], 1e3 * low[1], 1e3 * edge[1])
@@ -199,7 +202,7 @@ def _along(
 
 def _refused(axes: Axes, findings: SeamFindings) -> None:
     """Why nothing in view is a seam, in place of a cross-section."""
-    listed = [f"{units.to_mm(r.length):.0f} mm long: {r.reason}" for r in findings.rejected[:14]]
+    listed = [textwrap.fill(f"{units.to_mm(r.length):.0f} mm long: {r.reason}", 62) for r in findings.rejected[:14]]
     axes.set_axis_off()
     axes.set_title("Candidates refused", loc="left", fontsize=13, color=INK)
     axes.text(0, 0.95, "\n".join(listed) or "There were none.", va="top", color=INK, fontsize=11, transform=axes.transAxes)

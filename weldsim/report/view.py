@@ -131,9 +131,26 @@ def error_lines(
     return out
 
 
-def height_range(z: Float[ndarray, "n"]) -> tuple[float, float]:
-    """The range of heights that colours are spread over [m]: the groove and the parent surface, not the table below."""
-    return max(float(np.percentile(z, 1)), -0.012), min(float(np.percentile(z, 99)), 0.006)
+def heights(points_B: Float[ndarray, "n 3"], seams: tuple[Seam, ...], X_BS: Transform) -> Float[ndarray, "n"]:
+    """Height over the parent surface, which near a seam is the tangent plane at the nearest seam point [m].
+
+    A bent plate is level in these heights; without a seam they are heights over the view plane.
+    """
+    if not seams:
+        return X_BS.inverse().points(points_B)[:, 2]
+    at = np.concatenate([seam.points_B for seam in seams])
+    normals = np.concatenate([seam.normals_B for seam in seams])
+    nearest = KDTree(at).query(points_B)[1]
+    return np.einsum("ij,ij->i", points_B - at[nearest], normals[nearest])
+
+
+def height_range(values: Float[ndarray, "n"], seams: tuple[Seam, ...]) -> tuple[float, float]:
+    """The range of heights that colours are spread over [m]: around seams the groove and its surface, not the table below."""
+    low, high = (float(v) for v in np.percentile(values, [1, 99])) if len(values) else (0.0, 0.0)
+    if seams:
+        deepest = max((seam.depth or 0.008 for seam in seams), default=0.008)
+        low, high = max(low, -1.2 * deepest), min(high, 0.4 * deepest)
+    return (low, high) if high > low else (low - 1e-3, low + 1e-3)
 
 
 def _error_line(points: ndarray, known: KnownSeam, reference: Reference, sigma: ndarray | None) -> ErrorLine:

@@ -1,0 +1,134 @@
+"""Page and picture: valid figures, nothing fetched from a network, the same bytes each time, with a seam or without."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from tests.seams import findings, found_seam, plate_cloud, sine_seam, torch_path, weld_log
+from weldsim.errors import OutputError
+from weldsim.frames import Transform, matrix_from_rotation_vector
+from weldsim.records import Rejection, SeamFindings, Threshold
+from weldsim.report import figures
+from weldsim.report.html import write_html
+from weldsim.report.limits import ReportConfig
+from weldsim.report.png import write_png
+from weldsim.report.view import cross_section, error_lines, heights, shown, torch_axes, view_frame
+from weldsim.report.weld import weld_report
+
+RNG = np.random.default_rng(7)
+KNOWN = sine_seam(RNG)
+CLOUD, INSIDE = plate_cloud(KNOWN, RNG, n=15_000)
+SEAM = found_seam(KNOWN, 2e-4 * np.sin(KNOWN.s / 0.02))
+PATH = torch_path(SEAM)
+LOG = weld_log(PATH, RNG, jitter=1e-6)
+FOUND = SeamFindings(
+    seams=(SEAM,),
+    region=INSIDE.astype(np.int32),
+    rejected=(Rejection(position_B=(0.1, -0.5, 0.2), length=0.09, reason="material on <one> side only"),),
+    threshold=Threshold(name="depth", value=1e-3, unit="m", noise=3e-4, stability={"0.5": 1e-5, "2": float("inf")}),
+)
+REPORT = weld_report(FOUND, (PATH,), scene="sine <script>", log=LOG, known=(KNOWN,), true_region=INSIDE, timing={"seam": 0.1})
+NONE = weld_report(findings((), INSIDE), (), scene="plate", known=())
+
+
+def all_figures() -> dict[str, figures.Figure]:
+    lines = error_lines(FOUND, (PATH,), LOG, (KNOWN,), 0)
+    speed = figures.torch_speed(LOG, PATH, ReportConfig())
+    assert speed is not None
+    return {
+        "scene": figures.scene(CLOUD, FOUND, (PATH,), LOG, (KNOWN,)),
+        "empty scene": figures.scene(CLOUD, findings((), INSIDE), (), None, ()),
+        "uncertainty": figures.uncertainty(SEAM),
+        "section": figures.section(cross_section(CLOUD, SEAM)),
+        "across": figures.errors_across(lines),
+        "distance": figures.errors_distance(lines, ReportConfig()),
+        "speed": speed,
+        "q": figures.joints(LOG, "q", ("a", "b", "c", "d", "e", "f")),
+        "qd": figures.joints(LOG, "qd", ("a", "b", "c", "d", "e", "f")),
+    }
+
+
+def test_every_figure_is_one_that_plotly_accepts() -> None:
+    for name, figure in all_figures().items():
+        checked = go.Figure(figure)  # raises on a property that plotly does not know
+        assert len(checked.data) >= 1, name
+
+
+def test_page_holds_everything_and_asks_no_network(tmp_path: Path) -> None:
+    text = write_html(tmp_path / "r.html", REPORT, CLOUD, FOUND, (PATH,), log=LOG, known=(KNOWN,)).read_text()
+    assert "default-src 'none'" in text
+    # One copy of the library; outside of it there is no address at all.
+    library = max(re.findall(r"<script>(.*?)</script>", text, flags=re.DOTALL), key=len)
+    assert len(library) > 3_000_000
+    rest = text.replace(library, "")
+    assert len(rest) < 2_000_000
+    assert not re.search(r"https?://|//cdn|src=|@import|url\(", rest)
+    assert "sine &lt;script&gt;" in rest
+    assert "sine <script>" not in rest
+    assert "material on &lt;one&gt; side only" in rest
+    assert "seam lost" in rest
+    for reason in ("plan, cross-track mean", "executed tip from plan, p95", "PASSED"):
+        assert reason in rest
+
+
+@pytest.mark.parametrize("write", [write_html, write_png])
+def test_the_same_job_gives_the_same_bytes(tmp_path: Path, write) -> None:
+    first = write(tmp_path / "a", REPORT, CLOUD, FOUND, (PATH,), log=LOG, known=(KNOWN,)).read_bytes()
+    assert write(tmp_path / "b", REPORT, CLOUD, FOUND, (PATH,), log=LOG, known=(KNOWN,)).read_bytes() == first
+    plan_only = write(tmp_path / "c", REPORT, CLOUD, FOUND, (PATH,)).read_bytes()
+    assert plan_only != first
+    write(tmp_path / "d", NONE, CLOUD, findings((), INSIDE), ())
+    with pytest.raises(OutputError):
+        write(tmp_path / "none" / "a", NONE, CLOUD, findings((), INSIDE), ())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b", "c", "d"]
+
+
+def test_picture_has_the_size_of_a_slide(tmp_path: Path) -> None:
+    data = write_png(tmp_path / "p.png", REPORT, CLOUD, FOUND, (PATH,)).read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (int.from_bytes(data[16:20]), int.from_bytes(data[20:24])) == (1600, 900)
+
+
+def test_cross_section_is_the_groove_that_was_cut() -> None:
+    cut = cross_section(CLOUD, SEAM)
+    true = np.where(np.abs(cut.across) < 0.007, -0.008 * (1 - np.abs(cut.across) / 0.007), 0.0)
+    assert np.abs(cut.median - true).max() < 1.5e-3
+    assert np.abs(cut.median - true)[np.abs(cut.across) > 0.01].max() < 4e-4
+    assert (cut.low <= cut.median).all()
+    assert (cut.median <= cut.high).all()
+    assert cut.lips is not None
+    assert np.allclose(cut.lips, [[0.007, 0.0], [-0.007, 0.0]], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_view_follows_the_part(seed: int) -> None:
+    """Heights and thinning do not depend on where the part stands."""
+    rng = np.random.default_rng(seed)
+    X = Transform("BP", matrix_from_rotation_vector(rng.normal(size=3)), rng.uniform(-0.3, 0.3, 3))
+    frame = view_frame(CLOUD, (SEAM,))
+    assert abs(np.linalg.det(frame.R) - 1) < 1e-9
+    assert np.allclose(frame.R[:, 2], SEAM.normals_B[0], atol=1e-9)
+    height = heights(CLOUD.points, (SEAM,), frame)
+    assert np.abs(height[~INSIDE]).max() < 3e-3
+    moved = type(SEAM)(
+        points_B=X.points(SEAM.points_B),
+        s=SEAM.s,
+        tangents_B=X.vectors(SEAM.tangents_B),
+        normals_B=X.vectors(SEAM.normals_B),
+    )
+    cloud = type(CLOUD)(points=X.points(CLOUD.points))
+    assert np.allclose(heights(cloud.points, (moved,), view_frame(cloud, (moved,))), height, atol=1e-9)
+    index = shown(cloud, (moved,), 1000)
+    assert 0 < len(index) <= 1000
+    assert np.array_equal(index, shown(CLOUD, (SEAM,), 1000))
+
+
+def test_torch_axes_start_at_the_tip_and_go_back_along_the_wire() -> None:
+    axes = torch_axes(PATH, every=0.01, length=0.03)
+    assert len(axes) == int(PATH.s[-1] / 0.01) + 1
+    wire = (axes[:, 0] - axes[:, 1]) / 0.03
+    assert np.allclose(wire, -SEAM.normals_B[0], atol=1e-6)
+    assert np.linalg.norm(axes[:, 0] - PATH.X_BT.p[0], axis=1)[0] < 1e-12
