@@ -74,11 +74,12 @@ def make_section(config: GrooveConfig) -> GrooveSection:
         )
     walls = 2 * config.depth * np.tan(config.angle / 2)
     if walls > config.width * (1 + 1e-9):
+        widest = GrooveSection(config.width, config.depth, 0.0).angle
         raise SceneError(
             f"groove: walls at {np.degrees(config.angle):g} deg need a width of {walls * 1e3:.3f} mm"
             f" at depth {config.depth * 1e3:g} mm, but width is {config.width * 1e3:g} mm;"
-            f" widen it, make it shallower, or use an angle up to {np.degrees(2 * np.arctan(config.width / 2 / config.depth)):.2f} deg",
+            f" widen it, make it shallower, or use an angle up to {np.degrees(widest):.2f} deg",
             key="angle",
-            limit=float(2 * np.arctan(config.width / 2 / config.depth)),
+            limit=widest,
         )
     return GrooveSection(config.width, config.depth, max(0.0, config.width - walls))
