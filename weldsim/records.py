@@ -165,9 +165,8 @@ class PointCloud:
         _store(self, "viewpoints", self.viewpoints, shape=("k", 3))
         if self.view is not None:
             _store(self, "view", self.view, shape=(n,), dtype=np.int64)
-            _require(
-                n == 0 or (self.view.min() >= 0 and self.view.max() < len(self.viewpoints)), self, "view", "names no viewpoint"
-            )
+            named = n == 0 or bool(self.view.min() >= 0 and self.view.max() < len(self.viewpoints))
+            _require(named, self, "view", "names no viewpoint")
         if self.pixel is not None:
             _store(self, "pixel", self.pixel, shape=(n,), dtype=np.int64)
             _require(self.intrinsics is not None and self.X_BC is not None, self, "pixel", "needs intrinsics and X_BC")

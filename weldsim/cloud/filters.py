@@ -20,7 +20,7 @@ def prepare(cloud: PointCloud, config: CloudConfig) -> PointCloud:
     """
     steps = []
     if config.crop_min is not None and config.crop_max is not None:
-        low, high = np.array(config.crop_min), np.array(config.crop_max)
+        low, high = np.array(config.crop_min, float), np.array(config.crop_max, float)
         steps.append(("crop box", lambda points: crop(points, low, high)))
     if config.outlier_radius > 0:
         steps.append(("outlier_radius", lambda points: drop_sparse(points, config.outlier_radius, config.outlier_neighbours)))
