@@ -19,7 +19,7 @@ PYTHON_AT_LEAST = (3, 11)
 IMPORT_TIMEOUT = 60.0  # [s] a library that takes longer hangs
 
 # Import names that are not the distribution's name with - as _
-_IMPORT_NAMES = {"opencv-python-headless": "cv2", "pyyaml": "yaml"}
+_IMPORT_NAMES = {"opencv-python-headless": "cv2"}
 
 # Debian and Ubuntu packages of the shared libraries that the wheels expect to find
 _APT_PACKAGES = {

@@ -1,0 +1,48 @@
+"""`import weldsim` is cheap, and heavy libraries load where they are used."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+import weldsim
+
+HEAVY = {"open3d", "mujoco", "mink", "ruckig", "numba", "trimesh", "manifold3d", "plotly", "matplotlib"}
+LIMIT = 0.3  # [s] over a bare interpreter
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Top-level modules in sys.modules after a statement, in a process of its own."""
+    program = f"import sys; {statement}; print(*{{name.split('.')[0] for name in sys.modules}})"
+    return set(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split())
+
+
+def seconds(program: str) -> float:
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-c", program], check=True)
+    return time.perf_counter() - start
+
+
+def test_import_takes_under_a_third_of_a_second():
+    """Whole process less a bare interpreter; the best of several, for other work may run beside the tests."""
+    bare = min(seconds("pass") for _ in range(5))
+    assert min(seconds("import weldsim") for _ in range(5)) - bare < LIMIT
+
+
+def test_import_loads_no_library_at_all():
+    assert loaded_by("import weldsim") & (HEAVY | {"numpy", "scipy", "cv2", "jaxtyping"}) == set()
+
+
+@pytest.mark.parametrize("module", ["weldsim.cli", "weldsim.config", "weldsim.doctor"])
+def test_commands_load_heavy_libraries_only_when_they_run(module):
+    assert loaded_by(f"import {module}") & HEAVY == set()
+
+
+def test_public_names_are_the_ones_that_load():
+    assert set(weldsim.__all__) == {"__version__", *weldsim._PUBLIC}
+    assert dir(weldsim) == weldsim.__all__
+    for name in weldsim.__all__:
+        assert getattr(weldsim, name) is not None
+    with pytest.raises(AttributeError, match="no_such_name"):
+        weldsim.no_such_name  # noqa: B018 - the access is the test
