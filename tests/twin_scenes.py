@@ -12,7 +12,7 @@ from weldsim.sensor.exact import TwinScene
 PLATE_TOP = 0.77  # [m] above the floor of the world
 CENTRE_W = np.array([0.02, 0.45, PLATE_TOP])
 _NAMES = {
-    "floor": Label.OTHER,
+    "floor": Label.ROOM,
     "table": Label.TABLE,
     "plate": Label.PART,
     "groove": Label.GROOVE,
@@ -21,7 +21,7 @@ _NAMES = {
     "pin": Label.CLAMP,
     "stud": Label.CLAMP,
     "arm": Label.ROBOT,
-    "ghost": Label.OTHER,
+    "ghost": Label.ROOM,
 }
 _SCENE = """
 <mujoco>

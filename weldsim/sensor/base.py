@@ -26,7 +26,7 @@ class Label(IntEnum):
     GROOVE = 3
     CLAMP = 4
     ROBOT = 5
-    OTHER = 6
+    ROOM = 6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -24,6 +24,7 @@ class EmbreeRenderer(Renderer):
         self._geoms = [g for g in range(model.ngeom) if model.geom_group[g] < VISIBLE_GROUPS and rgba[g, 3] > 0]
         self._triangles: list[Triangles] = [geom_triangles(model, g) for g in self._geoms]
         self._placed: tuple[ndarray, ndarray] | None = None
+        self._rays_C: tuple[tuple[float, ...], Float32[ndarray, "n 3"]] | None = None
         self._scene = o3d.t.geometry.RaycastingScene()
         self._geom_of_id = np.zeros(1, np.int32)
 
@@ -31,10 +32,10 @@ class EmbreeRenderer(Renderer):
         self, data: mujoco.MjData, X_WC: Transform, intrinsics: CameraIntrinsics, *, colour: bool = True, depth: bool = True
     ) -> Render:
         self._place(data)
-        # Rays with z = 1 in C: the distance along the ray is the z-depth itself.
-        directions = (intrinsics.rays().reshape(-1, 3) @ X_WC.R.T).astype(np.float32)
-        rays = np.concatenate([np.broadcast_to(X_WC.p.astype(np.float32), directions.shape), directions], axis=1)
-        hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(rays.reshape(intrinsics.height, intrinsics.width, 6)))
+        directions = self._directions(intrinsics) @ X_WC.R.T.astype(np.float32)
+        rays = np.empty((intrinsics.height, intrinsics.width, 6), np.float32)
+        rays[..., :3], rays[..., 3:] = X_WC.p, directions.reshape(intrinsics.height, intrinsics.width, 3)
+        hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
         z = hit["t_hit"].numpy()
         seen = np.isfinite(z)
         geom = np.where(seen, self._geom_of_id[np.where(seen, hit["geometry_ids"].numpy(), 0)], -1).astype(np.int32)
@@ -42,6 +43,13 @@ class EmbreeRenderer(Renderer):
         if not depth:
             return Render(depth=np.full_like(z, np.nan), geom=np.full_like(geom, -1), colour=picture)
         return Render(depth=np.where(seen, z, np.float32(np.nan)), geom=geom, colour=picture)
+
+    def _directions(self, i: CameraIntrinsics) -> Float32[ndarray, "n 3"]:
+        """Rays with z = 1 in C, so that the distance along a ray is the z-depth itself; kept for the next view."""
+        key = (i.width, i.height, i.fx, i.fy, i.cx, i.cy)
+        if self._rays_C is None or self._rays_C[0] != key:
+            self._rays_C = (key, i.rays().reshape(-1, 3).astype(np.float32))
+        return self._rays_C[1]
 
     def close(self) -> None:
         self._scene, self._placed = o3d.t.geometry.RaycastingScene(), None

@@ -17,6 +17,8 @@ from weldsim.sensor.renderer import make_renderer
 if TYPE_CHECKING:
     import mujoco
 
+    from weldsim.scene.world import World
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TwinScene:
@@ -36,6 +38,12 @@ class TwinScene:
     def __post_init__(self) -> None:
         if self.labels.shape != (self.model.ngeom,):
             raise SensorError(f"scene labels: {self.labels.shape} for {self.model.ngeom} geoms", limit=self.model.ngeom)
+
+
+def twin_scene(world: "World", data: "mujoco.MjData") -> TwinScene:
+    """What the sensors of the twin look at: a world at the state `data`, its labels by geom."""
+    labels = np.array([Label[world.labels[geom].upper()] for geom in range(world.model.ngeom)], np.uint8)
+    return TwinScene(model=world.model, data=data, X_WB=world.X_WB, labels=labels)
 
 
 @final

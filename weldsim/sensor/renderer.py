@@ -86,10 +86,20 @@ def camera_pose(model: "mujoco.MjModel", data: "mujoco.MjData", camera: str) -> 
 
 
 def geom_colours(model: "mujoco.MjModel") -> Float[ndarray, "n 4"]:
-    """RGBA of each geom as MuJoCo draws it: the material's, unless the geom's own differs from the default."""
+    """RGBA of each geom as MuJoCo draws it, a texture by its mean: the material's, unless the geom's own is not the default."""
     rgba = np.array(model.geom_rgba, float)
     if model.nmat:
-        default = np.isclose(rgba, [0.5, 0.5, 0.5, 1.0]).all(axis=1)
-        use = default & (model.geom_matid >= 0)
-        rgba[use] = model.mat_rgba[model.geom_matid[use]]
+        materials = np.array([_material_colour(model, material) for material in range(model.nmat)])
+        use = np.isclose(rgba, [0.5, 0.5, 0.5, 1.0]).all(axis=1) & (model.geom_matid >= 0)
+        rgba[use] = materials[model.geom_matid[use]]
+    return rgba
+
+
+def _material_colour(model: "mujoco.MjModel", material: int) -> Float[ndarray, "4"]:
+    rgba = np.array(model.mat_rgba[material], float)
+    texture = int(model.mat_texid[material].max())  # -1 in every role but the one that is textured
+    if texture >= 0 and model.tex_nchannel[texture] >= 3:
+        start, channels = model.tex_adr[texture], model.tex_nchannel[texture]
+        texels = model.tex_data[start : start + model.tex_height[texture] * model.tex_width[texture] * channels]
+        rgba[:3] *= texels.reshape(-1, channels)[:, :3].mean(axis=0) / 255
     return rgba

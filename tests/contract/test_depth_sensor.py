@@ -1,0 +1,138 @@
+"""What every depth sensor promises, run over all of them: exact by OpenGL and by rays, the D415 model, replay."""
+
+import numpy as np
+import pytest
+
+from tests.twin_scenes import CENTRE_W, PLATE_TOP, camera_above, grooved_scene
+from weldsim.errors import SensorError
+from weldsim.frames import Transform
+from weldsim.mounts import D415_640X480
+from weldsim.records import CameraIntrinsics
+from weldsim.sensor.base import Capture, DepthSensor, Label, View
+from weldsim.sensor.exact import ExactSensor
+from weldsim.sensor.replay import ReplaySensor
+from weldsim.sensor.stereo import D415Fast
+
+SMALL = CameraIntrinsics(width=400, height=240, fx=617.0, fy=616.5, cx=216.1, cy=113.9)
+KINDS = [pytest.param("gl", marks=pytest.mark.render), "embree", "d415", "replay"]
+NOISY = ("d415",)
+SCENE = grooved_scene()
+
+
+def make_sensor(kind: str, seed: int = 0, intrinsics: CameraIntrinsics = D415_640X480) -> DepthSensor:
+    if kind == "gl":
+        return ExactSensor(SCENE, intrinsics, backend="egl")
+    exact = ExactSensor(SCENE, intrinsics, backend="embree")
+    if kind == "embree":
+        return exact
+    if kind == "d415":
+        return D415Fast(exact, seed=seed)
+    return ReplaySensor([exact.capture(view(seed=k)).frame for k in range(3)])
+
+
+def view(seed: int = 1, exposure: int = 0) -> View:
+    return View(X_BC=SCENE.X_WB.inverse() @ camera_above(seed), exposure=exposure, t=1.5)
+
+
+def equal(a: Capture, b: Capture) -> bool:
+    return np.array_equal(a.frame.depth, b.frame.depth, equal_nan=True)
+
+
+@pytest.mark.parametrize("intrinsics", [D415_640X480, SMALL], ids=["640x480", "400x240"])
+@pytest.mark.parametrize("kind", KINDS)
+class TestEverySensor:
+    def test_the_frame_is_as_promised(self, kind: str, intrinsics: CameraIntrinsics) -> None:
+        sensor = make_sensor(kind, intrinsics=intrinsics)
+        frame = sensor.capture(view()).frame
+        assert sensor.intrinsics is intrinsics
+        assert frame.intrinsics is intrinsics
+        assert frame.depth.shape == (intrinsics.height, intrinsics.width)
+        assert frame.depth.dtype == np.float32
+        seen = np.isfinite(frame.depth)
+        assert seen.mean() > 0.5
+        assert (np.isnan(frame.depth) | (frame.depth > 0.2) & (frame.depth < 1.0)).all()
+        assert not frame.depth.flags.writeable
+        assert frame.source
+
+    def test_no_return_is_nan(self, kind: str, intrinsics: CameraIntrinsics) -> None:
+        if kind == "replay":
+            with pytest.raises(SensorError, match="there are 3"):
+                make_sensor(kind, intrinsics=intrinsics).capture(view(exposure=3))
+            return
+        up = View(X_BC=Transform("BC", np.eye(3), np.array([0.0, -0.4, 0.5])))
+        assert np.isnan(make_sensor(kind, intrinsics=intrinsics).capture(up).frame.depth).all()
+
+    def test_equal_seeds_give_equal_bytes(self, kind: str, intrinsics: CameraIntrinsics) -> None:
+        first, second = (make_sensor(kind, seed=7, intrinsics=intrinsics).capture(view()) for _ in range(2))
+        assert first.frame.depth.tobytes() == second.frame.depth.tobytes()
+        assert first.frame.colour is not None
+        assert second.frame.colour is not None
+        assert first.frame.colour.tobytes() == second.frame.colour.tobytes()
+
+    def test_captures_do_not_depend_on_those_before(self, kind: str, intrinsics: CameraIntrinsics) -> None:
+        sensor = make_sensor(kind, intrinsics=intrinsics)
+        first = sensor.capture(view(exposure=0))
+        sensor.capture(view(seed=2, exposure=1))
+        assert equal(first, sensor.capture(view(exposure=0)))
+
+    def test_colour_is_registered_to_depth(self, kind: str, intrinsics: CameraIntrinsics) -> None:
+        """The red clamp stands 20 mm above the plate: red pixels lie at its height."""
+        frame = make_sensor(kind, intrinsics=intrinsics).capture(view()).frame
+        assert frame.colour is not None
+        rgb = frame.colour.astype(int)
+        red = (rgb[..., 0] > 2.5 * rgb[..., 1]) & (rgb[..., 0] > 60) & np.isfinite(frame.depth)
+        assert red.sum() > 100
+        points = frame.intrinsics.rays()[red] * frame.depth[red][:, None].astype(float)
+        height = (SCENE.X_WB @ frame.X_BC).points(points)[:, 2]
+        assert np.median(height) == pytest.approx(PLATE_TOP + 0.02, abs=1e-3)
+
+    def test_points_land_where_the_plate_is(self, kind: str, intrinsics: CameraIntrinsics) -> None:
+        """Pose, intrinsics and half pixels agree: the plate's top comes out at its height, within the noise."""
+        frame = make_sensor(kind, intrinsics=intrinsics).capture(view()).frame
+        points = (frame.intrinsics.rays() * frame.depth[..., None].astype(float))[np.isfinite(frame.depth)]
+        points_W = (SCENE.X_WB @ frame.X_BC).points(points)
+        across = (points_W - CENTRE_W)[:, :2] @ np.array([np.cos(0.2), np.sin(0.2)])
+        along = (points_W - CENTRE_W)[:, :2] @ np.array([-np.sin(0.2), np.cos(0.2)])
+        top = (np.abs(across) > 0.02) & (np.abs(across) < 0.045) & (np.abs(along) < 0.03)
+        assert top.sum() > 300
+        assert points_W[top, 2].mean() == pytest.approx(PLATE_TOP, abs=0.2e-3)
+
+
+@pytest.mark.parametrize("kind", NOISY)
+def test_noise_follows_seed_view_and_exposure(kind: str) -> None:
+    base = make_sensor(kind, seed=1).capture(view())
+    assert not equal(base, make_sensor(kind, seed=2).capture(view()))
+    assert not equal(base, make_sensor(kind, seed=1).capture(view(exposure=1)))
+    assert base.truth is not None
+    errors = []
+    for k in (1, 2):
+        capture = make_sensor(kind, seed=1).capture(view(seed=k))
+        assert capture.truth is not None
+        errors.append(capture.frame.depth - capture.truth.depth)
+    both = np.isfinite(errors[0]) & np.isfinite(errors[1]) & (np.abs(errors[0]) < 2e-3) & (np.abs(errors[1]) < 2e-3)
+    assert abs(np.corrcoef(errors[0][both], errors[1][both])[0, 1]) < 0.1  # another view, other noise
+
+
+@pytest.mark.parametrize("kind", [pytest.param("gl", marks=pytest.mark.render), "embree", "d415"])
+def test_the_twin_knows_what_was_in_view(kind: str) -> None:
+    truth = make_sensor(kind).capture(view()).truth
+    assert truth is not None
+    assert {Label.TABLE, Label.PART, Label.GROOVE, Label.CLAMP} <= set(np.unique(truth.labels))
+    assert ((truth.labels == Label.NONE) == np.isnan(truth.depth)).all()
+
+
+def test_a_recording_has_no_truth() -> None:
+    assert make_sensor("replay").capture(view()).truth is None
+
+
+def test_the_noise_model_needs_truth() -> None:
+    with pytest.raises(SensorError, match="exact depth"):
+        D415Fast(make_sensor("replay")).capture(view())
+
+
+def test_replay_refuses_no_frames_and_mixed_cameras() -> None:
+    with pytest.raises(SensorError, match="no frames"):
+        ReplaySensor([])
+    frames = [make_sensor("embree", intrinsics=i).capture(view()).frame for i in (D415_640X480, SMALL)]
+    with pytest.raises(SensorError, match="frame 1"):
+        ReplaySensor(frames)
