@@ -45,7 +45,7 @@ def new_cell(material: MaterialConfig) -> Spec:
     visual = spec.visual.global_
     visual.offwidth, visual.offheight = 1920, 1440
     spec.visual.quality.shadowsize = 4096
-    spec.visual.headlight.ambient = [0.28, 0.28, 0.30]
+    spec.visual.headlight.ambient = [0.32, 0.32, 0.34]
     spec.visual.headlight.diffuse = [0.22, 0.22, 0.22]
     spec.visual.headlight.specular = [0.05, 0.05, 0.05]
     _add_materials(spec, material)
@@ -69,8 +69,8 @@ def _add_materials(spec: Spec, part: MaterialConfig) -> None:
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[0.80, 0.84, 0.88],
-        rgb2=[0.42, 0.46, 0.52],
+        rgb1=[0.90, 0.93, 0.96],
+        rgb2=[0.55, 0.60, 0.66],
         width=256,
         height=256,
     )
@@ -107,7 +107,7 @@ def _add_hole_grid(spec: Spec) -> None:
 def _add_lights(spec: Spec) -> None:
     directional = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     for name, pos, direction, brightness, shadow in (
-        ("key", (1.2, 1.6, 3.0), (-0.45, -0.55, -1.1), 0.50, True),
+        ("key", (1.2, 1.6, 3.0), (-0.45, -0.55, -1.1), 0.58, True),
         ("fill", (-1.6, 0.8, 2.6), (0.7, -0.2, -1.0), 0.22, False),
         ("back", (0.0, -1.5, 2.5), (0.0, 0.8, -0.9), 0.15, False),
     ):

@@ -9,7 +9,7 @@ from weldsim.scene.config import FixtureConfig
 from weldsim.scene.shapes import Body, Group, Spec, box, mesh_geom, rod
 from weldsim.scene.workpieces.plate import PlateConfig
 
-BOLT_PLACES = ((-0.30, 0.33), (0.28, 0.30), (0.02, -0.36), (-0.33, -0.28), (0.34, -0.31), (0.0, 0.36))  # of length and width
+BOLT_PLACES = ((-0.30, 0.33), (0.28, 0.30), (0.05, -0.30), (-0.33, -0.28), (0.34, -0.31), (0.0, 0.36))  # of length and width
 
 
 def add_clamps(part: Body, config: FixtureConfig, plate: PlateConfig) -> None:

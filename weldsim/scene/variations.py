@@ -22,8 +22,8 @@ class VariationConfig:
         depth_high: greatest depth over width.
     """
 
-    yaw: Radian = np.radians(30.0)
-    tilt: Radian = np.radians(15.0)
+    yaw: Radian = np.pi / 6
+    tilt: Radian = np.pi / 12
     shift: Metre = 0.020
     width_low: Metre = 0.008
     width_high: Metre = 0.025

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from weldsim.errors import UnreachableError
 from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_NAMES, inverse
+from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, inverse
 from weldsim.mounts import D415_640X480, X_FC, X_WB
 from weldsim.records import CameraIntrinsics, KnownSeam
 from weldsim.scene.cell import new_cell
@@ -72,9 +73,40 @@ class World:
         """Ids of the geoms with this label."""
         return np.array([geom for geom, found in self.labels.items() if found == label], dtype=np.int64)
 
-    def view_solutions(self, view: int = 0) -> Float[ndarray, "k 6"]:
-        """All joint solutions [rad] that put the wrist camera at the view; empty when it is out of reach."""
-        return inverse(self.views[view] @ X_FC.inverse())
+    def view_joints(self, view: int = 0, near: Float[ndarray, "6"] = HOME) -> Float[ndarray, "6"]:
+        """Joint angles [rad] that put the wrist camera at the view, touch nothing and leave the part in sight, nearest to `near`.
+
+        Raises:
+            UnreachableError: no solution, or only ones that collide or hold the arm between camera and part.
+        """
+        X_BF = self.views[view] @ X_FC.inverse()
+        solutions = inverse(X_BF)
+        solutions = solutions + 2 * np.pi * np.round((near - solutions) / (2 * np.pi))
+        data = mujoco.MjData(self.model)
+        for q in solutions[np.abs(solutions - near).max(axis=1).argsort()] if len(solutions) else ():
+            data.qpos[self.qpos] = q
+            mujoco.mj_fwdPosition(self.model, data)
+            if data.ncon == 0 and (np.abs(q) <= JOINT_LIMIT).all() and self._part_in_sight(data):
+                return q
+        reason = "every joint solution collides or hides the part" if len(solutions) else "no joint solution"
+        raise UnreachableError(
+            f"scan view {view}: {reason} with the flange at ({X_BF.p[0]:.3f}, {X_BF.p[1]:.3f}, {X_BF.p[2]:.3f}) m in base;"
+            " change the view's standoff, tilt or roll, or move the part",
+            view=view,
+            position=tuple(X_BF.p),
+        )
+
+    def _part_in_sight(self, data: Any) -> bool:
+        """Whether no ray from the wrist camera to the part's outline or middle meets the robot."""
+        eye = data.camera("d415").xpos
+        shares = np.array([0.0, 0.35, 0.7, 0.95])[:, None, None]
+        targets = (self.X_WB @ self.X_BP).points((shares * self.workpiece.base_corners).reshape(-1, 3))
+        geom, visual = np.zeros(1, np.int32), np.array([1, 1, 1, 0, 0, 0], np.uint8)
+        for ray in targets - eye:
+            mujoco.mj_ray(self.model, data, eye, ray, visual, 1, -1, geom, None)
+            if self.labels.get(int(geom[0])) == "robot":
+                return False
+        return True
 
 
 def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480) -> World:
