@@ -61,7 +61,7 @@ def scene(
         "scene": {
             **{f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}} for name in "xyz"},
             "aspectmode": "data",
-            "camera": {"eye": _xyz((1.1 if findings.seams else 1.4) * eye), "up": _xyz(X_BS.R[:, 2])},
+            "camera": {"eye": _xyz((1.25 if findings.seams else 1.4) * eye), "up": _xyz(X_BS.R[:, 2])},
         },
         "margin": {"l": 0, "r": 0, "t": 8, "b": 0},
         "legend": {"orientation": "h", "y": 0.01, "x": 0.01, "bgcolor": "rgba(255,255,255,0.8)", "itemsizing": "constant"},

@@ -148,11 +148,11 @@ def _cards(report: WeldReport, findings: SeamFindings) -> str:
     cards: list[tuple[str, str]] = [(str(len(findings.seams)), "seams found")]
     if findings.seams:
         seam = findings.seams[0]
-        cards += [
-            (f"{units.to_mm(seam.length):.1f} mm", "length"),
-            (f"{units.to_mm(seam.width):.1f} mm", "width of the opening"),
-            (f"{seam.confidence:.2f}", "confidence"),
-        ]
+        cards.append((f"{units.to_mm(seam.length):.1f} mm", "length"))
+        if seam.width > 0:  # a method that measures none leaves 0
+            cards.append((f"{units.to_mm(seam.width):.1f} mm", "width of the opening"))
+        if seam.confidence > 0:
+            cards.append((f"{seam.confidence:.2f}", "confidence"))
         if seam.sigma is not None:
             cards.append((f"{units.to_mm(float(seam.sigma.mean())):.2f} mm", "sigma across, mean"))
     for name, error in (("plan", report.plan), ("executed", report.executed)):
@@ -187,10 +187,10 @@ def _seams(findings: SeamFindings) -> str:
             f'<td class="num">{text}</td>'
             for text in (
                 f"{units.to_mm(seam.length):.1f} mm",
-                f"{units.to_mm(seam.width):.1f} mm",
+                f"{units.to_mm(seam.width):.1f} mm" if seam.width > 0 else "",
                 "" if seam.depth is None else f"{units.to_mm(seam.depth):.1f} mm",
-                f"{units.to_mm(seam.residual):.2f} mm",
-                f"{seam.confidence:.2f}",
+                f"{units.to_mm(seam.residual):.2f} mm" if seam.residual > 0 else "",
+                f"{seam.confidence:.2f}" if seam.confidence > 0 else "",
             )
         )
         + "</tr>"
@@ -219,7 +219,7 @@ def _threshold(threshold: Threshold | None) -> str:
     for factor, move in threshold.stability.items():
         text = f"{units.to_mm(move):.3f} mm" if move < float("inf") else "seam lost"
         rows.append(f'<tr><td class="num">x {escape(factor)}</td><td class="num">{text}</td></tr>')
-    scale, unit = (1e3, "mm") if threshold.unit == "m" else (1.0, threshold.unit)
+    scale, unit = (1e3, "mm") if threshold.unit == "m" else (1.0, threshold.unit.removeprefix("1"))
     value, noise = (f"{scale * number:.3g} {unit}".strip() for number in (threshold.value, threshold.noise))
     note = escape(f"{threshold.name}: {value}, chosen from the cloud's own noise of {noise}.")
     return _section("Threshold", ("threshold", "greatest movement of the centre line"), rows, "", note)

@@ -62,14 +62,23 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
     """Scene, verdict and what decided it, over the whole width."""
     word, why = verdict(report, len(findings.seams), config)
     figure.text(0.05, 0.945, f"{report.scene}", fontsize=20, weight="bold", color=INK, va="center")
-    figure.text(0.97, 0.945, word, fontsize=20, weight="bold", color=GOOD if report.passed else BAD, va="center", ha="right")
+    figure.text(
+        0.97,
+        0.945,
+        word,
+        fontsize=20,
+        weight="bold",
+        color={"PASSED": GOOD, "FAILED": BAD}.get(word, WIRE),
+        va="center",
+        ha="right",
+    )
     count = len(findings.seams)
     facts = [f"{count} seam{'' if count == 1 else 's'}", f"method {report.method}"]
     if count:
         seam = findings.seams[0]
-        facts += [
-            f"{units.to_mm(seam.length):.1f} mm long, {units.to_mm(seam.width):.1f} mm wide, confidence {seam.confidence:.2f}"
-        ]
+        facts.append(f"{units.to_mm(seam.length):.1f} mm long")
+        facts += [f"{units.to_mm(seam.width):.1f} mm wide"] if seam.width > 0 else []  # 0: the method measures none
+        facts += [f"confidence {seam.confidence:.2f}"] if seam.confidence > 0 else []
     figure.text(0.05, 0.905, "   |   ".join(facts), fontsize=12, color=SOFT, va="center")
     figure.text(0.97, 0.905, why, fontsize=12, color=SOFT, va="center", ha="right")
 
@@ -194,6 +203,8 @@ def _along(
         axes.set_ylabel("sigma [mm]")
     else:
         axes.set_title("The method gives no standard deviation", loc="left", fontsize=13, color=SOFT)
+        axes.set_axis_off()
+        return
     axes.set_xlabel("along the seam [mm]")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(frameon=False, fontsize=9, loc="upper right", ncols=3)
