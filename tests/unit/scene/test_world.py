@@ -110,7 +110,8 @@ def test_rendered_seam_is_where_the_intrinsics_project_it(intrinsics: CameraIntr
     assert len(rows) > 500
     assert abs(columns.mean() + 0.5 - expected[:, 0].mean()) < 0.5
     assert abs(rows.mean() + 0.5 - expected[:, 1].mean()) < 0.5
-    assert abs(columns.min() - expected[:, 0].min()) < 1.5
+    # The crests of the S, away from the plate's edges where one lip outruns the other.
+    assert abs(rows.min() - expected[:, 1].min()) < 1.5
     assert abs(rows.max() + 1 - expected[:, 1].max()) < 1.5
 
 
