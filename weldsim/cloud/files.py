@@ -46,7 +46,8 @@ def read_cloud(path: str | Path, *, unit: LengthUnit = "m", viewpoint: Sequence[
     """
     data = read_bytes(path)
     try:
-        raw = _reader(data)(data)
+        with np.errstate(all="ignore"):  # signalling NaNs and the like are dropped below
+            raw = _reader(data)(data)
     except Unreadable as error:
         raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
     keep = _finite_rows(raw.points)

@@ -60,10 +60,11 @@ def read_text(data: bytes) -> RawCloud:
         data = _COMMENT_LINE.sub(lambda match: b"#" + match[0].lstrip()[1:], data)
     start, first, header = _first_row(data)
     body = data[start:]
-    delimiter = next((mark for mark in ";," if mark in first), None)
-    if delimiter == ";" and "," in first and "." not in first:
+    if ";" in first and "," in first and "." not in first:
         body, first = body.replace(b",", b"."), first.replace(",", ".")
-    width = _leading_numbers(first.split(delimiter))
+    delimiter, width = max(((mark, _leading_numbers(first.split(mark))) for mark in (None, ";", ",")), key=lambda pair: pair[1])
+    if width < 3:
+        raise Unreadable(f"it is no cloud: its numbers are separated in more than one way: {first[:40]!r}")
     table = parse_table(body, columns=width, delimiter=delimiter)
     check_count(len(table))
     if len(header) >= width and all(name in header[:width] for name in XYZ[0]):
