@@ -19,6 +19,8 @@ from weldsim.motion.timing import Move, piece_move
 from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import JointTrajectory, Segment, TorchPath
 
+LONG_RAMP = 0.002  # [m] a ramp worth a note
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MotionPlan:
@@ -29,6 +31,7 @@ class MotionPlan:
         rail: the tip's line, leads included; `rail.at(s)` is the pose asked for at arc length s.
         position_error, axis_error: greatest distance [m] and angle [rad] of the joint path from the rail.
         slowest: least ratio of planned to asked welding speed; below 1 a joint limit made the weld slower.
+        ramp: length at the ends of the weld in which the torch speeds up and slows down [m].
         dexterity, clearance: least on the way [m/rad], [m].  roll: rotation about the wire chosen [rad].
         notes: one sentence each, for people.
     """
@@ -38,6 +41,7 @@ class MotionPlan:
     position_error: float
     axis_error: float
     slowest: float
+    ramp: float
     dexterity: float
     clearance: float
     roll: float
@@ -70,10 +74,14 @@ def plan_motion(
         )
     rail = make_rail(path, config)
     posture, paths, moves = _first_that_holds(rail, q_start, X_FT, config, blocked)
-    slowest = min(move.slowest for move in moves if move.segment == Segment.WELD)
-    notes = []
+    weld = next(move for move in moves if move.segment == Segment.WELD)
+    slowest, notes = weld.slowest, []
     if slowest < 0.999:
         notes.append(f"joint limits slow the weld to {100 * slowest:.0f} % of the asked speed at the slowest place")
+    if weld.ramp > LONG_RAMP:
+        notes.append(
+            f"the first and last {1e3 * weld.ramp:.1f} mm of the weld are below the asked speed; a longer run-in would help"
+        )
     if posture.clearance < config.clearance:
         notes.append(
             f"the arm passes {1e3 * posture.clearance:.0f} mm from the table or itself (asked {1e3 * config.clearance:.0f} mm)"
@@ -84,6 +92,7 @@ def plan_motion(
         position_error=max(piece.position_error for piece in paths),
         axis_error=max(piece.axis_error for piece in paths),
         slowest=slowest,
+        ramp=weld.ramp,
         dexterity=posture.dexterity,
         clearance=posture.clearance,
         roll=posture.roll,
@@ -95,17 +104,9 @@ def _first_that_holds(
     rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
 ) -> tuple[Posture, list[JointPath], list[Move]]:
     """The best posture that can be followed all along and reached through the air, with its joint paths and moves."""
-    postures = find_postures(rail, q_start, X_FT, config, blocked)
     if blocked is not None and (touch := blocked(q_start)) is not None:
         raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch)
-    if not postures:
-        raise MotionError(
-            "path: every pose can be reached, but no posture of the arm sweeps the whole path without changing branch or touching"
-            " something; split the seam, move the part or allow rotation about the wire",
-            index=0,
-            s=rail.start,
-            reason="no posture",
-        )
+    postures = find_postures(rail, q_start, X_FT, config, blocked)
     model = kinematic_model(X_FT)
     lost: list[LostPathError] = []
     for posture in postures[: config.candidates]:

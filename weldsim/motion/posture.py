@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.errors import UnreachableError
+from weldsim.errors import MotionError, UnreachableError
 from weldsim.frames import Transform
 from weldsim.kinematics import D1, JOINT_LIMIT, REACH, inverse
 from weldsim.motion.arm import clearances, dexterity
@@ -15,7 +15,7 @@ from weldsim.motion.config import MotionConfig
 from weldsim.motion.rail import Rail
 
 HOP = 1.2  # [rad] a joint that turns further between two looks has changed branch
-LOOKS = 9  # poses of the rail at which a posture is judged
+LOOKS, LOOK_TURN, LOOK_LENGTH = 6, 0.4, 0.06  # at least so many looks along a weld, at most so far apart [rad], [m]
 SHY = 0.12  # [m/rad] dexterity below which a posture is penalised
 
 Blocked = Callable[[Float[ndarray, "6"]], str | None]
@@ -63,7 +63,7 @@ def _follow_branches(
         for options in solutions[1:]:
             step = (options - q[-1] + np.pi) % (2 * np.pi) - np.pi
             worst = np.abs(step).max(axis=1)
-            if worst.min() > HOP:
+            if len(options) == 0 or worst.min() > HOP:
                 break
             q.append(q[-1] + step[worst.argmin()])
         else:
@@ -80,7 +80,7 @@ def _judge(q: Float[ndarray, "m 6"], roll: float, q_start: Float[ndarray, "6"], 
     agile = float(dexterity(q, X_FT).min())
     free = float(clearances(q, config.floor, X_FT).min())
     to_stop = JOINT_LIMIT - np.abs(q).max()
-    cost = 0.3 * float(np.abs(q[0] - q_start).max()) + 0.2 * float(np.abs(np.diff(q, axis=0)).sum(axis=0).max())
+    cost = 0.3 * float(np.abs(q[0] - q_start).max()) + 0.2 * float(np.ptp(q, axis=0).max())
     cost += 4.0 * max(0.0, 1.0 - agile / SHY) ** 2 + 2.0 * max(0.0, 1.0 - to_stop / 1.0) ** 2
     cost += 20.0 * max(0.0, 1.0 - free / max(config.clearance, 1e-9))
     return Posture(q=q, roll=roll, cost=cost, dexterity=agile, clearance=free)
@@ -89,30 +89,69 @@ def _judge(q: Float[ndarray, "m 6"], roll: float, q_start: Float[ndarray, "6"], 
 def find_postures(
     rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None = None
 ) -> list[Posture]:
-    """Postures that reach the rail at every look without changing branch, best first.
+    """Postures that reach the rail at every look without changing branch, best first; at least one.
+
+    Where no constant rotation about the wire sweeps the whole rail, those that reach its first pose are returned:
+    following may still find a way by turning about the wire.
 
     Raises:
         UnreachableError: a pose that no branch and no roll reaches; `data` has index, s, position, distance, reach.
+        MotionError: everything reachable touches something; `data`: index, s, reason.
     """
-    looks = np.unique(np.concatenate([np.linspace(rail.start, rail.end, LOOKS - 2), rail.s[[0, -1]]]))
+    looks = _looks(rail)
     X_BT = rail.at(looks)
     X_TF = X_FT.inverse()
     frames = roll_frames(X_BT) if rail.roll_free else X_BT.R
-    rolls = np.arange(config.rolls) * 2 * np.pi / config.rolls if rail.roll_free else np.zeros(1)
-    postures, reached = [], np.zeros(len(looks), bool)
-    for roll in rolls:
-        X_BF = Transform("BT", _turned(frames, float(roll)), X_BT.p) @ X_TF
-        solutions = [inverse(X_BF[i]) for i in range(len(looks))]
-        reached |= np.array([len(options) > 0 for options in solutions])
-        for q in _follow_branches(solutions, q_start, JOINT_LIMIT - config.limit_margin):
-            postures.append(_judge(q, float(roll), q_start, X_FT, config))
+    options: list[tuple[float, list[Float[ndarray, "k 6"]]]] = []
+    for roll in _rolls(rail, config):
+        X_BF = Transform("BT", _turned(frames, roll), X_BT.p) @ X_TF
+        options.append((roll, [inverse(X_BF[i]) for i in range(len(looks))]))
+    reached = np.array([[len(found) > 0 for found in solutions] for _, solutions in options]).any(axis=0)
     if not reached.all():
         # Between the last look reached and the first that is not, find the very pose that fails.
         bad = int(np.flatnonzero(~reached)[0])
         raise unreachable(rail, _first_unreachable(rail, looks[max(bad - 1, 0)], looks[bad], X_TF, config))
-    if blocked is not None:
-        postures = [posture for posture in postures if all(blocked(q) is None for q in posture.q)]
-    return sorted(postures, key=lambda posture: posture.cost)
+    limit = JOINT_LIMIT - config.limit_margin
+    postures: list[Posture] = []
+    for seen in (len(looks), 1):
+        if not postures:
+            postures = [
+                _judge(q, roll, q_start, X_FT, config)
+                for roll, solutions in options
+                for q in _follow_branches(solutions[:seen], q_start, limit)
+            ]
+    return _clear(sorted(postures, key=lambda posture: posture.cost), rail, blocked)
+
+
+def _clear(postures: list[Posture], rail: Rail, blocked: Blocked | None) -> list[Posture]:
+    """The postures that touch nothing at any look. Raises MotionError when there is none."""
+    if blocked is None:
+        return postures
+    touches = [next((touch for q in posture.q if (touch := blocked(q)) is not None), None) for posture in postures]
+    clear = [posture for posture, touch in zip(postures, touches, strict=True) if touch is None]
+    if clear:
+        return clear
+    raise MotionError(
+        f"path: all {len(postures)} postures that reach it touch something, the best one: {touches[0]};"
+        " move the part or the fixture, or change the torch angles",
+        index=rail.path_index(rail.start),
+        s=rail.start,
+        reason=touches[0],
+    )
+
+
+def _looks(rail: Rail) -> Float[ndarray, "m"]:
+    """Arc lengths at which postures are judged, near enough for branches to be told apart."""
+    R = rail.at(np.linspace(rail.start, rail.end, 64)).R
+    turned = R[:, :, 2] if rail.roll_free else R.reshape(len(R), 9) / np.sqrt(2.0)
+    turn = float(np.linalg.norm(np.diff(turned, axis=0), axis=1).sum())
+    n = max(LOOKS, int(np.ceil(turn / LOOK_TURN)), int(np.ceil((rail.end - rail.start) / LOOK_LENGTH)))
+    return np.unique(np.concatenate([np.linspace(rail.start, rail.end, n + 1), rail.s[[0, -1]]]))
+
+
+def _rolls(rail: Rail, config: MotionConfig) -> list[float]:
+    """Rotations about the wire to try [rad]."""
+    return [2 * np.pi * k / config.rolls for k in range(config.rolls)] if rail.roll_free else [0.0]
 
 
 def _first_unreachable(rail: Rail, near: float, far: float, X_TF: Transform, config: MotionConfig) -> float:
@@ -121,8 +160,7 @@ def _first_unreachable(rail: Rail, near: float, far: float, X_TF: Transform, con
     while high - low > 0.0005:
         middle = (low + high) / 2
         X_BT = rail.at(np.array([middle]))
-        rolls = np.arange(config.rolls) * 2 * np.pi / config.rolls if rail.roll_free else np.zeros(1)
-        if any(len(inverse((Transform("BT", _turned(X_BT.R, float(roll)), X_BT.p) @ X_TF)[0])) for roll in rolls):
+        if any(len(inverse((Transform("BT", _turned(X_BT.R, roll), X_BT.p) @ X_TF)[0])) for roll in _rolls(rail, config)):
             low = middle
         else:
             high = middle

@@ -26,7 +26,8 @@ class Move:
 
     Attributes:
         segment: what it is.  q, qd, qdd: (k, 6).  s: (k,) [m].  speed: (k,) tip speed along the rail [m/s], 0 in the air.
-        slowest: least ratio of planned to asked tip speed, 1 where the limits never bite.
+        slowest: least ratio of allowed to asked tip speed, 1 where the joints' limits never bite.
+        ramp: length in which the tip reaches its speed at either end [m].
     """
 
     segment: Segment
@@ -36,6 +37,7 @@ class Move:
     s: Float[ndarray, "k"]
     speed: Float[ndarray, "k"]
     slowest: float = 1.0
+    ramp: float = 0.0
 
 
 def _sample(trajectory: ruckig.Trajectory, start: float, period: float, n: int) -> ndarray:
@@ -68,11 +70,24 @@ def air_move(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config:
     return Move(segment=Segment.AIR, q=q, qd=qd, qdd=qdd, s=np.full(n, s), speed=np.zeros(n))
 
 
+@dataclass(frozen=True, kw_only=True)
+class _TipLimits:
+    """What the tip may do along one piece: acceleration [m/s2], jerk [m/s3]."""
+
+    acceleration: float
+    jerk: float
+
+
 def piece_move(rail: Rail, path: JointPath, config: MotionConfig) -> Move:
     """The tip along one piece at its asked speed, slower where a joint limit asks for it, at rest at both ends."""
-    edges, limit, slowest = _speed_limits(rail, path, config)
-    profile = _arc_profile(edges, limit, config)
-    s, ds, dds = profile.T
+    start, end = float(path.spline.x[0]), float(path.spline.x[-1])
+    everywhere = np.linspace(start, end, 9 * max(2, round((end - start) / BLOCK)))
+    # Half the joints' acceleration is for ramps of the tip's speed, the rest for bends of the joint path.
+    ramp = 0.5 * HEADROOM * config.joint_acceleration_limit / max(float(np.abs(path.spline(everywhere, 1)).max()), 1e-9)
+    share = min(1.0, ramp / config.tip_acceleration)
+    tip = _TipLimits(acceleration=share * config.tip_acceleration, jerk=share * config.tip_jerk)
+    edges, limit, asked = _speed_limits(rail, path, tip, config)
+    s, ds, dds = _arc_profile(edges, limit, tip, config.period).T
     q1, q2 = path.spline(s, 1), path.spline(s, 2)
     return Move(
         segment=path.segment,
@@ -81,76 +96,73 @@ def piece_move(rail: Rail, path: JointPath, config: MotionConfig) -> Move:
         qdd=q2 * (ds**2)[:, None] + q1 * dds[:, None],
         s=s,
         speed=ds,
-        slowest=slowest,
+        slowest=float((limit / asked).min()),
+        ramp=min((end - start) / 2, max(_ramp(0.0, float(v), tip) for v in (limit[0], limit[-1]))),
     )
 
 
 def _speed_limits(
-    rail: Rail, path: JointPath, config: MotionConfig
-) -> tuple[Float[ndarray, "b_plus_1"], Float[ndarray, "b"], float]:
-    """Edges of the blocks of constant speed [m], the speed in each [m/s], and the least ratio to the asked speed."""
+    rail: Rail, path: JointPath, tip: _TipLimits, config: MotionConfig
+) -> tuple[Float[ndarray, "b_plus_1"], Float[ndarray, "b"], Float[ndarray, "b"]]:
+    """Edges of blocks along the piece [m], the speed allowed in each and the speed asked for [m/s]."""
     start, end = float(path.spline.x[0]), float(path.spline.x[-1])
-    edges = np.linspace(start, end, max(1, round((end - start) / BLOCK)) + 1)
-    inside = (rail.s > start + 1e-9) & (rail.s < end - 1e-9)
-    changes = rail.s[inside][np.diff(rail.speed[inside], prepend=rail.speed[inside][:1]) != 0] if inside.any() else np.zeros(0)
-    edges = np.unique(np.concatenate([edges, changes]))
+    inside = (rail.s > start + 1e-6) & (rail.s < end - 1e-6)
+    changes = rail.s[inside][np.diff(rail.speed[inside], prepend=rail.speed[inside][:1]) != 0]
+    edges = np.unique(np.concatenate([np.linspace(start, end, max(1, round((end - start) / BLOCK)) + 1), changes]))
     edges = edges[np.concatenate([[True], np.diff(edges) > 1e-6])]
     edges[-1] = end
-    middle = (edges[:-1] + edges[1:]) / 2
-    i = np.clip(np.searchsorted(rail.s, middle, side="right") - 1, 0, len(rail.s) - 2)
+    i = np.clip(np.searchsorted(rail.s, (edges[:-1] + edges[1:]) / 2, side="right") - 1, 0, len(rail.s) - 2)
     # Inside the weld the slower neighbour counts; a lead has its own speed at its far end alone.
     pick = np.minimum if path.segment == Segment.WELD else np.maximum
     asked = pick(rail.speed[i], rail.speed[i + 1])
     u = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 9)
     rate, bend = np.abs(path.spline(u, 1)).max(axis=(1, 2)), np.abs(path.spline(u, 2)).max(axis=(1, 2))
-    # A ramp adds the joint acceleration of the tip's own; what it leaves is for the bend of the joint path.
-    left = np.maximum(
-        HEADROOM * config.joint_acceleration_limit - rate * config.tip_acceleration, 0.1 * config.joint_acceleration_limit
-    )
+    left = HEADROOM * config.joint_acceleration_limit - rate * tip.acceleration
     allowed = np.minimum(HEADROOM * config.joint_speed_limit / np.maximum(rate, 1e-9), np.sqrt(left / np.maximum(bend, 1e-9)))
-    limit = np.minimum(asked, allowed)
-    same = np.concatenate([[True], np.abs(np.diff(limit)) > 1e-9])
-    return np.append(edges[:-1][same], end), limit[same], float((limit / asked).min())
+    return edges, np.minimum(asked, allowed), asked
 
 
-def _arc_profile(edges: Float[ndarray, "b_plus_1"], limit: Float[ndarray, "b"], config: MotionConfig) -> Float[ndarray, "k 3"]:
+def _arc_profile(
+    edges: Float[ndarray, "b_plus_1"], limit: Float[ndarray, "b"], tip: _TipLimits, period: float
+) -> Float[ndarray, "k 3"]:
     """Arc length, speed and acceleration of the tip (k, 3) every period: at the limit wherever the ramps allow."""
-    between = np.concatenate([[0.0], np.minimum(limit[:-1], limit[1:]), [0.0]])
-    between = _reachable(edges, between, config)
+    # One profile for each run of blocks with the same limit.
+    new = np.concatenate([[True], np.abs(np.diff(limit)) > 1e-9])
+    edges, limit = np.append(edges[:-1][new], edges[-1]), limit[new]
+    between = _reachable(edges, np.concatenate([[0.0], np.minimum(limit[:-1], limit[1:]), [0.0]]), tip)
     rows, clock = [], 0.0
     for a, b, v0, v1, cap in zip(edges[:-1], edges[1:], between[:-1], between[1:], limit, strict=True):
         request = ruckig.InputParameter(1)
         request.current_position, request.target_position = [float(a)], [float(b)]
         request.current_velocity, request.target_velocity = [float(v0)], [float(v1)]
         request.max_velocity = [float(max(cap, v0, v1))]
-        request.max_acceleration, request.max_jerk = [config.tip_acceleration], [config.tip_jerk]
+        request.max_acceleration, request.max_jerk = [tip.acceleration], [tip.jerk]
         trajectory = _solve(ruckig.Ruckig(1), request, 1, f"arc length {1e3 * a:.1f} to {1e3 * b:.1f} mm")
-        n = max(0, int(np.ceil((trajectory.duration - clock) / config.period - 1e-9)))
-        rows.append(_sample(trajectory, clock, config.period, n)[..., 0] if n else np.zeros((0, 3)))
-        clock += n * config.period - trajectory.duration
+        n = max(0, int(np.ceil((trajectory.duration - clock) / period - 1e-9)))
+        if n:
+            rows.append(_sample(trajectory, clock, period, n)[..., 0])
+        clock += n * period - trajectory.duration
     rows.append(np.array([[edges[-1], 0.0, 0.0]]))
     profile = np.concatenate(rows)
     profile[:, 0] = np.clip(profile[:, 0], edges[0], edges[-1])
     return profile
 
 
-def _reachable(
-    edges: Float[ndarray, "b_plus_1"], speed: Float[ndarray, "b_plus_1"], config: MotionConfig
-) -> Float[ndarray, "b_plus_1"]:
+def _reachable(edges: Float[ndarray, "b_plus_1"], speed: Float[ndarray, "b_plus_1"], tip: _TipLimits) -> Float[ndarray, "b_plus_1"]:
     """Edge speeds lowered until each block is long enough to change from one to the next within acceleration and jerk."""
     speed = speed.copy()
     for order in (range(len(edges) - 1), range(len(edges) - 2, -1, -1)):
         for k in order:
             low, high = sorted((k, k + 1), key=lambda e: speed[e])
             length, best = edges[k + 1] - edges[k], speed[high]
-            while _ramp(speed[low], best, config) > length and best > speed[low]:
+            while _ramp(speed[low], best, tip) > length and best > speed[low]:
                 best = max(speed[low], best - 0.05 * (speed[high] - speed[low]) - 1e-9)
             speed[high] = best
     return speed
 
 
-def _ramp(v0: float, v1: float, config: MotionConfig) -> float:
+def _ramp(v0: float, v1: float, tip: _TipLimits) -> float:
     """Length [m] needed to change speed from v0 to v1 with both accelerations zero at the ends."""
-    dv, a, j = abs(v1 - v0), config.tip_acceleration, config.tip_jerk
+    dv, a, j = abs(v1 - v0), tip.acceleration, tip.jerk
     time = 2 * np.sqrt(dv / j) if dv <= a * a / j else dv / a + a / j
     return float((v0 + v1) / 2 * time)
