@@ -7,6 +7,7 @@ there (missing library, no device, no display). The trial here makes a context a
 
 import importlib
 import os
+import subprocess
 import sys
 from collections.abc import Callable
 from functools import lru_cache
@@ -16,6 +17,8 @@ from weldsim.errors import SensorError
 
 Backend = Literal["egl", "osmesa", "glfw", "embree"]
 GlPlatform = Literal["egl", "osmesa", "glfw"]
+
+PATIENCE = 30.0  # [s] for a trial in a process of its own
 
 _OFF = ("disable", "disabled", "off", "false", "0")
 _ANY = ("", "enable", "enabled", "on", "true", "1")
@@ -56,10 +59,16 @@ def gl_candidates(environ: dict[str, str]) -> tuple[GlPlatform, ...]:
 
 @lru_cache(maxsize=1)
 def probe() -> tuple[Backend, tuple[tuple[str, str], ...]]:
-    """The back end that works, and the reason for each that does not. Tried once a process."""
+    """The back end that works, and the reason for each that does not. Tried once a process.
+
+    MuJoCo takes the first OpenGL library that a process has loaded, so a platform that failed here would spoil the next:
+    with more than one candidate each is tried in a process of its own (0.4 s); name one in MUJOCO_GL to save that.
+    """
+    candidates = gl_candidates(dict(os.environ))
+    attempt = _try_here if len(candidates) == 1 else _try_apart
     failures = []
-    for platform in gl_candidates(dict(os.environ)):
-        reason = _try_platform(platform)
+    for platform in candidates:
+        reason = attempt(platform)
         if reason is None:
             return platform, tuple(failures)
         failures.append((platform, reason))
@@ -73,19 +82,32 @@ def gl_context_class(platform: GlPlatform) -> Callable[[int, int], Any]:
     return importlib.import_module("mujoco.rendering.classic.gl_context").GLContext
 
 
-def _try_platform(platform: GlPlatform) -> str | None:
-    """None if the platform draws, else why not."""
-    had_platform = "PYOPENGL_PLATFORM" in os.environ
+def _try_here(platform: GlPlatform) -> str | None:
+    """None if the platform draws in this process, else why not."""
     try:
-        _draw_once(platform)
+        draw_once(platform)
     except Exception as error:  # drivers fail with ImportError, AttributeError, OSError, RuntimeError, FatalError, GLError
-        if not had_platform:
-            _forget_pyopengl()
         return " ".join(f"{type(error).__name__}: {error}".split())[:300]
     return None
 
 
-def _draw_once(platform: GlPlatform) -> None:
+def _try_apart(platform: GlPlatform) -> str | None:
+    """The same in a new process, which may even crash."""
+    code = f"from weldsim.sensor.backend import draw_once; draw_once({platform!r})"
+    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    try:
+        child = subprocess.run(
+            [sys.executable, "-c", code], env=environ, capture_output=True, text=True, timeout=PATIENCE, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return f"gave no answer in {PATIENCE:g} s"
+    if child.returncode == 0:
+        return None
+    lines = child.stderr.strip().splitlines() or [f"ended with code {child.returncode}"]
+    return " ".join(lines[-1].split())[:300]
+
+
+def draw_once(platform: GlPlatform) -> None:
     """Makes a context and a MuJoCo drawing on it. Raises whatever the driver raises."""
     import mujoco  # heavy: a fifth of a second
 
@@ -97,11 +119,3 @@ def _draw_once(platform: GlPlatform) -> None:
         drawing.free()
     finally:
         context.free()
-
-
-def _forget_pyopengl() -> None:
-    """Undoes the platform choice PyOpenGL made at import, so that the next platform can be tried in this process."""
-    os.environ.pop("PYOPENGL_PLATFORM", None)
-    for name in list(sys.modules):
-        if name.split(".")[0] == "OpenGL" or name in ("mujoco.egl", "mujoco.egl.egl_ext", "mujoco.osmesa"):
-            del sys.modules[name]

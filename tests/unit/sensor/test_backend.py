@@ -46,8 +46,15 @@ def test_without_opengl_rays_are_cast(environ: dict[str, str], tried: str) -> No
 
 def test_an_unset_choice_finds_the_same_as_the_default() -> None:
     """Nothing set, no display: what draws here is found, and both give the same depth."""
-    backend, depth = run().split()[0], run().split()[-1]
+    backend, *_, depth = run().split()
     assert backend == rendering_backend()
+    assert depth == run(MUJOCO_GL="disabled").split()[-1]
+
+
+def test_where_the_first_choice_fails_the_next_is_found() -> None:
+    """Each is tried in a process of its own; off-screen Mesa may or may not be installed."""
+    backend, *failed, depth = run(MUJOCO_EGL_DEVICE_ID="99").split()
+    assert failed == {"osmesa": ["egl"], "embree": ["egl", "osmesa"]}[backend]
     assert depth == run(MUJOCO_GL="disabled").split()[-1]
 
 
