@@ -85,7 +85,7 @@ class _Solver:
                 break
         reached = self.configuration.get_transform_frame_to_world(TORCH_SITE, "site")
         distance = float(np.linalg.norm(reached.translation() - X_BT.p))
-        angle = float(_angle(reached.rotation().as_matrix()[:, 2], X_BT.R[:, 2]))
+        angle = float(_angle(reached.rotation().as_matrix()[None, :, 2], X_BT.R[None, :, 2])[0])
         if distance > self.config.position_tolerance or angle > self.config.axis_tolerance:
             raise LostPathError(
                 f"s = {1e3 * s:.1f} mm: stays {1e3 * distance:.3g} mm and {np.rad2deg(angle):.3g} deg off",
@@ -95,7 +95,8 @@ class _Solver:
         return self.configuration.q.copy()
 
 
-def _angle(a: Float[ndarray, "*n 3"], b: Float[ndarray, "*n 3"]) -> Float[ndarray, "*n"]:
+def _angle(a: Float[ndarray, "n 3"], b: Float[ndarray, "n 3"]) -> Float[ndarray, "n"]:
+    """Angle between directions [rad], exact for small ones."""
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
 
 

@@ -68,10 +68,10 @@ def plan_motion(
         MotionError: reachable pose by pose, but in no single sweep of the arm; `data`: index, s, reason.
     """
     config = config or MotionConfig()
-    if np.abs(q_start).max() > JOINT_LIMIT:
-        raise MotionError(
-            f"start: joint {int(np.abs(q_start).argmax()) + 1} is beyond +-360 deg", joint=int(np.abs(q_start).argmax())
-        )
+    inside = np.abs(q_start) <= JOINT_LIMIT
+    if not inside.all():
+        joint = int(np.flatnonzero(~inside)[0])
+        raise MotionError(f"start: {JOINT_NAMES[joint]} at {np.rad2deg(q_start[joint]):.0f} deg (limit +-360 deg)", joint=joint)
     rail = make_rail(path, config)
     posture, paths, moves = _first_that_holds(rail, q_start, X_FT, config, blocked)
     weld = next(move for move in moves if move.segment == Segment.WELD)

@@ -54,8 +54,8 @@ def _turned(R: Float[ndarray, "*m 3 3"], roll: float) -> Float[ndarray, "*m 3 3"
 
 
 def _follow_branches(
-    solutions: list[Float[ndarray, "k 6"]], q_start: Float[ndarray, "6"], limit: float
-) -> list[Float[ndarray, "m 6"]]:
+    solutions: list[Float[ndarray, "_ 6"]], q_start: Float[ndarray, "6"], limit: float
+) -> list[Float[ndarray, "_ 6"]]:
     """Joint paths through one solution per look, no joint turning more than HOP, unwrapped near q_start within limit."""
     paths = []
     for first in solutions[0]:
@@ -102,7 +102,7 @@ def find_postures(
     X_BT = rail.at(looks)
     X_TF = X_FT.inverse()
     frames = roll_frames(X_BT) if rail.roll_free else X_BT.R
-    options: list[tuple[float, list[Float[ndarray, "k 6"]]]] = []
+    options: list[tuple[float, list[Float[ndarray, "_ 6"]]]] = []
     for roll in _rolls(rail, config):
         X_BF = Transform("BT", _turned(frames, roll), X_BT.p) @ X_TF
         options.append((roll, [inverse(X_BF[i]) for i in range(len(looks))]))
