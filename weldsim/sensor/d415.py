@@ -1,6 +1,6 @@
 """Depth as a D415 reports it, from exact depth: a parametric model of an active-stereo camera.
 
-One view, no second rendering and no matching. The steps follow the way the error arises (SENSORS notes 2.5): the window
+One view, no second rendering and no matching. The steps follow the way the error arises: the window
 of the matcher averages disparity and so rounds grooves off; laser speckle adds noise that is alike over a few pixels and
 stronger where the window sees relief; sub-pixel interpolation pulls towards whole pixels; disparity and depth are
 stored in steps. Constants are fitted to a simulated stereo pair with matching, not to a real D415.
