@@ -1,0 +1,1 @@
+"""How the scene is seen: depth sensors, exact, modelled and recorded."""
