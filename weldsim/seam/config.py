@@ -1,0 +1,54 @@
+"""Settings of the seam finders."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from weldsim.quantity import Metre, Radian
+from weldsim.seam.thesis.config import ThesisConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfileConfig:
+    """Limits of what counts as a groove for the default method. Nothing here is a noise threshold: those come from the
+    cloud itself.
+
+    Attributes:
+        min_width, max_width: opening widths accepted [m].
+        min_length: shortest seam accepted [m].
+        min_depth: shallowest groove accepted, as the sensor shows it [m].
+        search_width: width of the window that closes valleys in the coarse search [m]; wider than max_width.
+        side_band: how far beyond each lip the parent surface is read [m].
+        station_step: spacing of the cross-sections along the seam [m].
+        max_side_angle: largest angle between the parent surfaces left and right of a groove [rad].
+        max_side_step: largest height difference between them at the groove [m].
+        max_gap: longest stretch without a visible groove that still joins two pieces into one seam [m].
+        detection_factor: detection threshold in robust standard deviations of the valley image above its median.
+        points_per_seam: at most this many points are used for the fit of one seam, evenly thinned.
+    """
+
+    min_width: Metre = 0.0045
+    max_width: Metre = 0.028
+    min_length: Metre = 0.030
+    min_depth: Metre = 0.0006
+    search_width: Metre = 0.036
+    side_band: Metre = 0.022
+    station_step: Metre = 0.001
+    max_side_angle: Radian = 0.30
+    max_side_step: Metre = 0.003
+    max_gap: Metre = 0.030
+    detection_factor: float = 4.0
+    points_per_seam: int = 60_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamConfig:
+    """Which seam finder runs, and its settings.
+
+    Attributes:
+        method: "profile" fits cross-sections along a smooth curve (default); "thesis" is chapter 5 as published.
+        profile: settings of the default method.  thesis: settings of the published one.
+    """
+
+    method: Literal["profile", "thesis"] = "profile"
+    profile: ProfileConfig = field(default_factory=ProfileConfig)
+    thesis: ThesisConfig = field(default_factory=ThesisConfig)

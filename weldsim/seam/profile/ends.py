@@ -1,0 +1,79 @@
+"""Where a groove begins and ends: where it fades inside the plate, or where the plate itself ends."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.parent import CELL
+from weldsim.seam.profile.refine import Fit, pieces, sided
+
+NEAR = 0.014  # [m] beyond the lips' surroundings, over which the plate's edge is read
+RUN_OUT = 0.010  # [m] the most an end is carried past the last station whose depth can be trusted
+
+
+def seam_span(fit: Fit, config: ProfileConfig) -> tuple[float, float]:
+    """Arc length on the rail [m] at which the groove begins and ends.
+
+    From the stretch with parent surface on both sides the groove is followed outward while its depth stays like a
+    groove's. Where the depth fades, the end is where it halves. Where the plate ends, its edge is drawn as a line
+    through the last parent surface left and right, and the end is where that line crosses the groove.
+    """
+    core = pieces(fit.track.weight > 0, fit.rail.step)[0]
+    return _end(fit, core.start, -1), _end(fit, core.stop - 1, +1)
+
+
+def _end(fit: Fit, last: int, way: int) -> float:
+    amplitude, step = fit.track.amplitude, fit.rail.step
+    one_side = fit.parent.support.max(axis=1) > 0.5
+    j = last
+    while 0 <= j + way < len(amplitude) and 0.5 < np.nan_to_num(amplitude[j + way]) < 1.5 and one_side[j + way]:
+        j += way
+    beyond = j + way
+    here = j * step
+    if 0 <= beyond < len(amplitude) and np.nan_to_num(amplitude[beyond], nan=9.0) <= 0.5 and one_side[beyond]:
+        drop = amplitude[j] - amplitude[beyond]
+        return here + way * step * float(np.clip((amplitude[j] - 0.5) / max(drop, 1e-6), 0.0, 1.0))
+    edge = _edge_crossing(fit, way, here)
+    if edge is None:
+        return here
+    return float(np.clip(edge, here - 0.002, here + RUN_OUT) if way > 0 else np.clip(edge, here - RUN_OUT, here + 0.002))
+
+
+def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
+    """Arc length [m] at which the parent surface's edge crosses the groove, or None where it has no edge nearby."""
+    s, x = fit.parent.cells.T
+    near = (np.abs(x) < fit.inner + NEAR) & (np.abs(s - here) < 0.045)
+    if np.count_nonzero(near) < 20:
+        return None
+    column = np.round(x[near] / CELL).astype(int)
+    lines = []
+    for k in np.unique(column):
+        inside = np.sort(s[near][column == k] * way)
+        gaps = np.flatnonzero(np.diff(inside) > 3 * CELL)
+        lines.append((k * CELL, way * (inside[gaps[0]] if len(gaps) else inside[-1]) + way * CELL / 2))
+    across, edge = np.array(lines).T
+    limit = here + way * 0.044
+    if np.mean((edge - limit) * way > -CELL) > 0.3:
+        return None
+    if not ((across > 0).sum() >= 3 and (across < 0).sum() >= 3):
+        return None
+    keep = np.ones(len(edge), bool)
+    fit_line = np.polyfit(across, edge, 1)
+    for _ in range(4):
+        off = np.abs(edge - np.polyval(fit_line, across))
+        keep = off <= max(2.5 * float(np.median(off)), 0.0015)
+        fit_line = np.polyfit(across[keep], edge[keep], 1)
+    return float(np.polyval(fit_line, 0.0)) if keep.sum() >= 6 else None
+
+
+def station_mask(fit: Fit, span: tuple[float, float]) -> Bool[ndarray, "m"]:
+    """Stations within a span of arc length [m]."""
+    s: Float[ndarray, "m"] = np.arange(len(fit.rail)) * fit.rail.step
+    return (s >= span[0]) & (s <= span[1])
+
+
+def supported(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> float:
+    """Fraction of the span's stations at which the groove is seen between two parent surfaces."""
+    inside = station_mask(fit, span)
+    return float(np.mean((fit.track.weight > 0)[inside] & sided(fit.parent, config)[inside])) if inside.any() else 0.0

@@ -1,0 +1,136 @@
+"""The default seam finder: grooves by fitting cross-sections along a smooth curve.
+
+Coarse: valleys of the cloud's chart (`chart`, `valley`). Fine: each candidate is measured along its own rail
+(`refine`), ended (`ends`) and judged (`judge`). No threshold is typed: the coarse one comes from the valley image's own
+background, the smoothing from cross-validation, the blur of the camera's support window from the groove's own shape.
+"""
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from weldsim.curves import arc_length, interpolate, project, tangents
+from weldsim.frames import unit
+from weldsim.records import PointCloud, Rejection, Seam, SeamFindings, Threshold
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.chart import Chart, make_chart
+from weldsim.seam.profile.ends import seam_span, station_mask
+from weldsim.seam.profile.grid import ray_coordinates
+from weldsim.seam.profile.judge import confidence, refusal
+from weldsim.seam.profile.rail import lay_out
+from weldsim.seam.profile.refine import Fit, refine
+from weldsim.seam.profile.valley import trace_valleys, valley_image
+
+SURROUNDINGS = 0.042  # [m] points within this of a coarse line take part in its fit
+
+
+def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_factor: float = 1.0) -> SeamFindings:
+    """Every groove of a cloud, best first, with what was refused and why.
+
+    Args:
+        cloud: in B, at least a few hundred points.
+        threshold_factor: multiplies the coarse threshold, to see how much it matters.
+    """
+    chart = make_chart(cloud)
+    valleys = valley_image(chart, config, threshold_factor)
+    threshold = Threshold(name="valley depth along 25 mm", value=valleys.threshold, unit="m", noise=valleys.noise)
+    accepted: list[tuple[Fit, tuple[float, float], float]] = []
+    rejected: list[Rejection] = []
+    normal = -chart.axes[2]
+    origins = cloud.sight_origins()
+    for coarse in trace_valleys(chart, valleys, config):
+        line = coarse.points
+        if coarse.level < 0.25:
+            rejected.append(_rejection(line, f"surface at one level on both sides over only {coarse.level:.0%} of it"))
+            continue
+        if any(_covers(fit, line) for fit, _, _ in accepted):
+            continue
+        picked = _surroundings(chart, line, config.points_per_seam)
+        fit = refine(line, normal, cloud.points[picked], None if origins is None else origins[picked], config)
+        if fit is None:
+            rejected.append(_rejection(line, "no parent surface on both sides at one level"))
+            continue
+        span = seam_span(fit, config)
+        reason = refusal(fit, span, config)
+        if reason is not None:
+            rejected.append(_rejection(line, reason))
+        elif not any(_covers(other, fit.rail.points[station_mask(fit, span)]) for other, _, _ in accepted):
+            accepted.append((fit, span, confidence(fit, span, config)))
+    accepted.sort(key=lambda found: (-round(found[2], 2), found[1][0] - found[1][1]))
+    region = np.zeros(len(cloud), np.int32)
+    for number, (fit, span, _) in enumerate(accepted, start=1):
+        _mark_region(region, number, cloud, chart, fit, span)
+    seams = tuple(_seam(fit, span, sure) for fit, span, sure in accepted)
+    return SeamFindings(seams=seams, region=region, rejected=tuple(rejected), threshold=threshold, method="profile")
+
+
+def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:
+    middle = line[len(line) // 2]
+    return Rejection(
+        position_B=(float(middle[0]), float(middle[1]), float(middle[2])), length=float(arc_length(line)[-1]), reason=reason
+    )
+
+
+def _covers(fit: Fit, line: Float[ndarray, "k 3"]) -> bool:
+    """Whether most of a line lies within an accepted groove."""
+    distance, _, _ = project(line, fit.rail.points)
+    return bool(np.mean(distance < 0.6 * fit.section.width) > 0.5)
+
+
+def _surroundings(chart: Chart, line: Float[ndarray, "k 3"], most: int) -> Int[ndarray, "m"]:
+    """Indices of the points within SURROUNDINGS of a line (as the chart sees it), thinned evenly to `most`."""
+    far = np.ones(chart.valid.shape, np.uint8)
+    local = (line - chart.origin) @ chart.axes.T
+    uv = local[:, :2] / local[:, 2:] if chart.perspective else local[:, :2]
+    column, row = np.clip(((uv - chart.corner) / chart.step).astype(int), 0, np.array(far.shape[::-1]) - 1).T
+    far[row, column] = 0
+    near = cv2.distanceTransform(far, cv2.DIST_L2, 3) < SURROUNDINGS / chart.pitch
+    index = np.flatnonzero(np.concatenate([near.ravel(), [False]])[chart.cell])
+    # A fixed-seed random thinning: an even stride would beat against the rows of a depth image.
+    if len(index) <= most:
+        return index
+    return np.sort(np.random.default_rng(0).choice(index, most, replace=False))
+
+
+def _mark_region(
+    region: Int[ndarray, "n"], number: int, cloud: PointCloud, chart: Chart, fit: Fit, span: tuple[float, float]
+) -> None:
+    """Write `number` at the points whose sight line enters between the lips of a groove."""
+    rail_part = fit.rail.points[station_mask(fit, span)]
+    near = _surroundings(chart, rail_part, len(cloud))
+    origins = cloud.sight_origins()
+    strip = lay_out(fit.rail, cloud.points[near], None if origins is None else origins[near])
+    s, x, depth = ray_coordinates(strip, fit.parent)
+    inside: Bool[ndarray, "k"] = (np.abs(x) <= fit.section.width / 2) & (s >= span[0]) & (s <= span[1]) & (depth > -0.004)
+    region[near[inside]] = number
+
+
+def _seam(fit: Fit, span: tuple[float, float], sure: float) -> Seam:
+    """The seam record: the rail between its ends, lips on the parent surface."""
+    rail, step = fit.rail, fit.rail.step
+    at = np.arange(len(rail)) * step
+    stations = np.concatenate([[span[0]], at[(at > span[0] + 0.3 * step) & (at < span[1] - 0.3 * step)], [span[1]]])
+
+    points = interpolate(at, rail.points, stations)
+    for end in (0, -1):  # beyond the rail's own last station: straight on
+        points[end] += (stations[end] - np.clip(stations[end], at[0], at[-1])) * rail.t[end]
+    t = tangents(points)
+    n = unit(interpolate(at, rail.n, stations))
+    n = unit(n - np.einsum("ij,ij->i", n, t)[:, None] * t)
+    left = np.cross(n, t)
+    half = fit.section.width / 2
+    sigma = np.interp(stations, at, fit.sigma)
+    return Seam(
+        points_B=points,
+        s=arc_length(points),
+        tangents_B=t,
+        normals_B=n,
+        left_B=points + half * left,
+        right_B=points - half * left,
+        sigma=sigma,
+        width=fit.section.width,
+        depth=fit.section.depth,
+        residual=fit.parent.noise,
+        confidence=sure,
+    )

@@ -1,0 +1,60 @@
+"""A strip averaged into cells of station by lateral position: the straightened picture of a groove."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.seam.profile.parent import Parent
+from weldsim.seam.profile.rail import Rail, Strip
+
+DX = 0.0005  # [m] lateral size of a cell
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Attributes:
+    x: (w,) lateral centre of each column [m].
+    depth: (m, w) mean apparent depth below the parent surface [m], NaN where empty.
+    count: (m, w) points in each cell.
+    shear: (m,) lateral drift of the sight line for each metre inward.
+    """
+
+    x: Float[ndarray, "w"]
+    depth: Float[ndarray, "m w"]
+    count: Float[ndarray, "m w"]
+    shear: Float[ndarray, "m"]
+
+
+def ray_coordinates(strip: Strip, parent: Parent) -> tuple[Float[ndarray, "k"], Float[ndarray, "k"], Float[ndarray, "k"]]:
+    """Where each point's sight line meets the parent surface (s, x) [m], and its apparent depth [m] in inverse depth."""
+    station = strip.station
+    surface = parent.a[station] + parent.b[station] * strip.x + parent.c * strip.x**2
+    below = surface - strip.h
+    s = strip.s - below * strip.slope[:, 0]
+    x = strip.x - below * strip.slope[:, 1]
+    with np.errstate(invalid="ignore"):
+        scale = np.where(np.isfinite(strip.above), strip.above / np.maximum(strip.above + below, 1e-3), 1.0)
+    return s, x, below * scale
+
+
+def make_grid(rail: Rail, strip: Strip, parent: Parent, half: float) -> Grid:
+    """The grid of a strip out to |x| < half [m]."""
+    s, x, depth = ray_coordinates(strip, parent)
+    m, width = len(rail), int(np.ceil(2 * half / DX))
+    row = np.rint(s / rail.step).astype(int)
+    column = np.floor((x + half) / DX).astype(int)
+    inside = (row >= 0) & (row < m) & (column >= 0) & (column < width) & (depth > -0.02)
+    index = row[inside] * width + column[inside]
+    count = np.bincount(index, minlength=m * width).astype(float)
+    total = np.bincount(index, weights=depth[inside], minlength=m * width)
+    mean = np.divide(total, count, out=np.full(m * width, np.nan), where=count > 0)
+    near = np.abs(strip.x) < half
+    number = np.bincount(strip.station[near], minlength=m)
+    drift = np.bincount(strip.station[near], weights=strip.slope[near, 1], minlength=m)
+    known = number > 0
+    at = np.arange(m)
+    shear = np.interp(at, at[known], drift[known] / number[known]) if known.any() else np.zeros(m)
+    centres = (np.arange(width) + 0.5) * DX - half
+    return Grid(centres, mean.reshape(m, width), count.reshape(m, width), shear)

@@ -1,0 +1,69 @@
+"""Is it a groove? Each reason to refuse a candidate, with its figure and limit; and how sure an accepted one is."""
+
+import numpy as np
+
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.ends import station_mask, supported
+from weldsim.seam.profile.refine import Fit
+
+MISFIT_LIMIT = 0.75
+MIN_SUPPORT = 0.5
+
+
+def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> str | None:
+    """Why the candidate is no groove, one clause, or None if it is one."""
+    section, length = fit.section, span[1] - span[0]
+    support = supported(fit, span, config)
+    contrast = _contrast(fit)
+    checks = [
+        (length < config.min_length, f"{length * 1e3:.1f} mm long, under {config.min_length * 1e3:.0f} mm"),
+        (section.width < config.min_width, f"opening {section.width * 1e3:.1f} mm, under {config.min_width * 1e3:.1f} mm"),
+        (section.width > config.max_width, f"opening {section.width * 1e3:.1f} mm, over {config.max_width * 1e3:.1f} mm"),
+        (length < 2.0 * section.width, f"{length * 1e3:.1f} mm long, under twice its width of {section.width * 1e3:.1f} mm"),
+        (_shown_depth(fit) < config.min_depth, f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {config.min_depth * 1e3:.2f} mm"),
+        (fit.track.misfit > MISFIT_LIMIT, f"cross-sections fit a groove poorly ({fit.track.misfit:.2f}, limit {MISFIT_LIMIT})"),
+        (contrast < 4.0, f"depth is {contrast:.1f} times its own scatter, under 4"),
+        (support < MIN_SUPPORT, f"parent surface on both sides over {support:.0%} of it, under {MIN_SUPPORT:.0%}"),
+        (_floor_goes_on(fit, span), "its floor goes on as the surface around it: a gap between two objects on a plate"),
+    ]
+    return next((reason for failed, reason in checks if failed), None)
+
+
+def confidence(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> float:
+    """0 to 1: support on both sides, agreement with the section, and depth against its scatter, multiplied."""
+    explained = max(0.0, 1.0 - fit.track.misfit**2)
+    clear = 1.0 - float(np.exp(-((_contrast(fit) / 8.0) ** 2)))
+    return float(np.clip(supported(fit, span, config) * explained * clear, 0.0, 1.0))
+
+
+def _shown_depth(fit: Fit) -> float:
+    """Greatest depth of the blurred section [m]."""
+    return float(np.max(fit.section.depth_at(fit.grid.x, np.full_like(fit.grid.x, float(np.median(fit.grid.shear))))))
+
+
+def _contrast(fit: Fit) -> float:
+    """Mean amplitude over its standard error, from blocks of stations about as long as the noise is correlated."""
+    seen = fit.track.weight > 0
+    values = fit.track.amplitude[seen]
+    if len(values) < 12:
+        return 0.0
+    block = 6
+    means = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
+    if len(means) < 2:
+        return 0.0
+    return float(means.mean() / max(means.std(ddof=1), 1e-3))
+
+
+def _floor_goes_on(fit: Fit, span: tuple[float, float]) -> bool:
+    """Whether, beyond both ends, a surface goes on at the level of the floor: the gap between two clamps on a plate."""
+    step, grid = fit.rail.step, fit.grid
+    floor = np.abs(grid.x) < max(0.3 * fit.section.width, 0.002)
+    level = float(np.nanmedian(grid.depth[station_mask(fit, span)][:, floor]))
+    found = []
+    for start, stop in ((span[0] - 0.012, span[0] - 0.004), (span[1] + 0.004, span[1] + 0.012)):
+        a, b = max(round(start / step), 0), min(round(stop / step), len(grid.depth))
+        patch = grid.depth[a:b]
+        if b - a < 3 or np.isfinite(patch).mean() < 0.5:
+            return False
+        found.append(bool(np.nanmean(np.abs(patch - level) < 0.25 * abs(level) + 0.001) > 0.7))
+    return all(found)

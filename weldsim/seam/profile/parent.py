@@ -1,0 +1,210 @@
+"""The parent surface under a strip: a robust smooth fit to what lies beside the groove, carried across it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from weldsim.seam.profile.rail import Rail, Strip
+
+CELL = 0.002  # [m] side of the cells that points are averaged in before fitting
+TOLERANCE = 0.003  # [m] a cell farther than this from the parent surface is never part of it
+WINDOW = 0.020  # [m] along the seam, over which the two sides are compared
+STIFFNESSES = (0.02, 0.5, 10.0, 200.0, 4000.0)  # of the penalty on roughness, relative to the data between two knots
+FOLD = 0.030  # [m] along the seam, left out together to choose the stiffness
+LEVER = 0.020  # [m] that turns twist into height
+KNOT = 0.025  # [m] spacing of the knots of the surface's height along the seam
+
+
+@dataclass(frozen=True, eq=False)
+class Parent:
+    """h(s, x) = a(s) + b(s) x + c x^2 in a rail's coordinates.
+
+    Attributes:
+        a, b: (m,) at each station [m], [1].  c: curvature term [1/m].
+        noise: robust standard deviation of the cells about it [m].
+    sigma: standard deviation of its height at the groove [m], with the noise's own correlation.
+        step, angle: (m,) height difference [m] and angle [rad] between the surfaces left and right of each station, each
+        carried to its middle; infinity where either is missing.
+    """
+
+    a: Float[ndarray, "m"]
+    b: Float[ndarray, "m"]
+    c: float
+    noise: float
+    sigma: float
+    step: Float[ndarray, "m"]
+    angle: Float[ndarray, "m"]
+    support: Float[ndarray, "m 2"]
+    cells: Float[ndarray, "k 2"]
+
+
+def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float) -> Parent:
+    """The parent surface from points with inner < |x| < outer [m].
+
+    Reweighted least squares (Tukey) from a wide to a narrow scale, so that clamps and the table fall out.
+    """
+    m = len(rail)
+    band = (np.abs(strip.x) > inner) & (np.abs(strip.x) < outer) & (np.abs(strip.h) < 0.5 * outer + inner)
+    s, x, h, _ = _cells(strip, band, m * rail.step, outer)
+    length = m * rail.step
+    knots = max(3, round(length / KNOT) + 1)
+    design = _design(s, x, length, knots)
+    penalty, target = _roughness(rail, knots)
+    penalty, target = penalty * len(s) / knots, target * len(s) / knots
+    stiffness, scale = STIFFNESSES[2], 0.003
+    weight = np.ones(len(s))
+    for turn in range(8):
+        if turn == 4:
+            stiffness = _choose_stiffness(design, h, weight, penalty, target, np.floor(s / FOLD).astype(int) % 4)
+        theta = _solve(design, h, weight, stiffness * penalty, stiffness * target)
+        residual = h - design @ theta
+        spread = 1.4826 * float(np.median(np.abs(residual)[weight > 0.05])) if (weight > 0.05).any() else scale
+        scale = max(0.6 * scale, 1.5 * spread, 1e-5)
+        weight = np.maximum(1 - (residual / (3 * scale)) ** 2, 0.0) ** 2
+    good = np.abs(residual) < min(3 * scale, TOLERANCE)
+    noise = 1.4826 * float(np.median(np.abs(residual[good]))) if good.any() else scale
+    at = np.arange(m) * rail.step
+    basis, size = _basis(at, length, knots), knots + 2
+    step, angle = _side_difference(s, x, residual, np.abs(residual) < 2 * TOLERANCE, m, rail.step)
+    return Parent(
+        a=basis @ theta[:size],
+        b=basis @ theta[size : 2 * size],
+        c=float(theta[-1]),
+        noise=noise,
+        sigma=_height_sigma(s[good], x[good], residual[good]),
+        step=step,
+        angle=angle,
+        support=_support(s, x, good, m, rail.step, outer - inner),
+        cells=np.stack([s[good], x[good]], axis=1),
+    )
+
+
+def _cells(strip: Strip, band: Bool[ndarray, "k"], length: float, outer: float) -> tuple[ndarray, ndarray, ndarray, ndarray]:
+    """Mean (s, x, h) of the points in each cell that holds any, and their count."""
+    width = int(np.ceil(2 * outer / CELL))
+    row = np.floor(strip.s[band] / CELL).astype(int)
+    column = np.floor((strip.x[band] + outer) / CELL).astype(int)
+    rows = int(np.ceil(length / CELL)) + 1
+    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < width)
+    index = row[inside] * width + column[inside]
+    count = np.bincount(index, minlength=rows * width)
+    held = np.nonzero(count)[0]
+    means = [
+        np.bincount(index, weights=v[band][inside], minlength=rows * width)[held] / count[held] for v in (strip.s, strip.x, strip.h)
+    ]
+    return means[0], means[1], means[2], count[held]
+
+
+def _basis(s: Float[ndarray, "k"], length: float, knots: int) -> Float[ndarray, "k b"]:
+    """Uniform cubic B-splines over [0, length], knots + 2 of them."""
+    place = np.clip(s / length, 0.0, 1.0) * (knots - 1)
+    y = np.abs(place[:, None] - np.arange(-1, knots + 1)[None, :])
+    return np.where(y < 1, 2 / 3 - y**2 + y**3 / 2, np.where(y < 2, (2 - y) ** 3 / 6, 0.0))
+
+
+def _design(s: Float[ndarray, "k"], x: Float[ndarray, "k"], length: float, knots: int) -> Float[ndarray, "k p"]:
+    basis = _basis(s, length, knots)
+    return np.concatenate([basis, basis * x[:, None], (x**2)[:, None]], axis=1)
+
+
+def _roughness(rail: Rail, knots: int) -> tuple[Float[ndarray, "p p"], Float[ndarray, "p"]]:
+    """Quadratic penalty on the surface's change of curvature along the seam and of twist, and its linear term.
+
+    It is the surface in space that shall be smooth, not its height above a rail that wavers: the rail's own third
+    differences along its normals, and second differences of its normals (with a lever of 20 mm), are counted in.
+    Straight parts, arcs and steady twists are free; stretches without data are bridged.
+    """
+    size = knots + 2
+    at = np.linspace(-1, knots, size) / (knots - 1) * (len(rail) - 1)
+    inner = np.clip(at, 0, len(rail) - 1)
+    whole = np.rint(inner).astype(int)
+    points = rail.points[whole] + ((at - whole) * rail.step)[:, None] * rail.t[whole]
+    third, second = np.diff(np.eye(size), n=3, axis=0), np.diff(np.eye(size), n=2, axis=0)
+    bend = np.einsum("ij,ij->i", third @ points, rail.n[whole][1:-2])
+    twist = np.einsum("ij,ij->i", second @ rail.n[whole], rail.e[whole][1:-1])
+    penalty, target = np.zeros((2 * size + 1, 2 * size + 1)), np.zeros(2 * size + 1)
+    penalty[:size, :size], target[:size] = third.T @ third, -third.T @ bend
+    penalty[size : 2 * size, size : 2 * size] = second.T @ second * LEVER**2
+    target[size : 2 * size] = second.T @ twist * LEVER**2
+    return penalty, target
+
+
+def _solve(
+    design: Float[ndarray, "k p"],
+    h: Float[ndarray, "k"],
+    weight: Float[ndarray, "k"],
+    penalty: Float[ndarray, "p p"],
+    target: Float[ndarray, "p"],
+) -> Float[ndarray, "p"]:
+    normal = design.T @ (design * weight[:, None]) + penalty
+    normal[np.diag_indices_from(normal)] += 1e-9 * (1 + np.trace(normal) / len(normal))
+    return np.linalg.solve(normal, design.T @ (weight * h) + target)
+
+
+def _choose_stiffness(
+    design: Float[ndarray, "k p"],
+    h: Float[ndarray, "k"],
+    weight: Float[ndarray, "k"],
+    penalty: Float[ndarray, "p p"],
+    target: Float[ndarray, "p"],
+    fold: Int[ndarray, "k"],
+) -> float:
+    """The stiffness that best predicts stretches left out."""
+    errors = []
+    for stiffness in STIFFNESSES:
+        error = 0.0
+        for k in range(4):
+            out = fold == k
+            theta = _solve(design, h, np.where(out, 0.0, weight), stiffness * penalty, stiffness * target)
+            error += float(weight[out] @ (h[out] - design[out] @ theta) ** 2)
+        errors.append(error)
+    best = min(errors)
+    return max(stiffness for stiffness, error in zip(STIFFNESSES, errors, strict=True) if error <= 1.02 * best)
+
+
+def _height_sigma(s: Float[ndarray, "k"], x: Float[ndarray, "k"], residual: Float[ndarray, "k"]) -> float:
+    """Standard deviation [m] of the surface's height, from the scatter of block means: they carry the correlation."""
+    side = 0.010
+    label = np.floor(s / side).astype(int) * 1000 + np.floor(x / side).astype(int)
+    _, which, count = np.unique(label, return_inverse=True, return_counts=True)
+    full = count >= 8
+    if np.count_nonzero(full) < 6:
+        return float(residual.std()) if len(residual) else 0.0
+    means = np.bincount(which, weights=residual)[full] / count[full]
+    # About 11 such blocks, both sides of one knot interval together, carry the height there.
+    return float(means.std()) / np.sqrt(11.0)
+
+
+def _side_difference(
+    s: Float[ndarray, "k"], x: Float[ndarray, "k"], residual: Float[ndarray, "k"], use: Bool[ndarray, "k"], m: int, step: float
+) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:
+    """Height step [m] and angle [rad] at each station between lines fitted left and right over WINDOW along the seam."""
+    station = np.clip((s / step).astype(int), 0, m - 1)
+    kernel = np.ones(round(WINDOW / step))
+    height, slope, held = np.zeros((2, m)), np.zeros((2, m)), np.ones(m, bool)
+    for k, side in enumerate((use & (x > 0), use & (x < 0))):
+        moments = [np.ones(side.sum()), x[side], x[side] ** 2, residual[side], x[side] * residual[side]]
+        n, sx, sxx, sh, sxh = (
+            np.convolve(np.bincount(station[side], weights=w, minlength=m), kernel, mode="same") for w in moments
+        )
+        spread = np.maximum(n * sxx - sx * sx, 1e-18)
+        slope[k] = (n * sxh - sx * sh) / spread
+        height[k] = (sh - slope[k] * sx) / np.maximum(n, 1)
+        held &= n >= 12
+    difference = np.where(held, np.abs(height[0] - height[1]), np.inf)
+    return difference, np.where(held, np.abs(np.arctan(slope[0]) - np.arctan(slope[1])), np.inf)
+
+
+def _support(
+    s: Float[ndarray, "k"], x: Float[ndarray, "k"], good: Bool[ndarray, "k"], m: int, step: float, band: float
+) -> Float[ndarray, "m 2"]:
+    """Fraction of each side's cells, within 3 mm along the seam, that hold parent surface."""
+    stations = np.clip((s / step).astype(int), 0, m - 1)
+    out = np.zeros((m, 2))
+    kernel = np.ones(max(1, round(0.006 / step)))
+    full = band / CELL * (len(kernel) * step / CELL)
+    for k, side in enumerate((good & (x > 0), good & (x < 0))):
+        out[:, k] = np.convolve(np.bincount(stations[side], minlength=m), kernel, mode="same") / full
+    return np.minimum(out, 1.0)

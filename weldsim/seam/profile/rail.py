@@ -1,0 +1,108 @@
+"""A smooth curve on the parent surface with a frame at every station: the rail a groove is measured along."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+from scipy.spatial import cKDTree
+
+from weldsim.curves import arc_length, interpolate, tangents
+from weldsim.frames import unit
+
+
+@dataclass(frozen=True, eq=False)
+class Rail:
+    """Attributes:
+    points: (m, 3) evenly spaced stations [m].
+    t, e, n: (m, 3) unit axes: along travel, to the left (n x t), outward normal of the parent surface.
+    step: spacing of the stations [m].
+    """
+
+    points: Float[ndarray, "m 3"]
+    t: Float[ndarray, "m 3"]
+    e: Float[ndarray, "m 3"]
+    n: Float[ndarray, "m 3"]
+    step: float
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """Points in a rail's coordinates.
+
+    Attributes:
+        station: (k,) nearest station of each point.
+        s: (k,) arc length from station 0 [m].  x: (k,) to the left [m].  h: (k,) along the outward normal [m].
+        slope: (k, 2) sight line's drift along (t, e) for each metre it goes inward; zero where the viewpoint is unknown.
+        above: (k,) height of the viewpoint above the parent plane [m]; infinity where unknown.
+    """
+
+    station: Int[ndarray, "k"]
+    s: Float[ndarray, "k"]
+    x: Float[ndarray, "k"]
+    h: Float[ndarray, "k"]
+    slope: Float[ndarray, "k 2"]
+    above: Float[ndarray, "k"]
+
+
+def make_rail(points: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], step: float, extend: float = 0.0) -> Rail:
+    """A rail through a smooth polyline, resampled at `step` and lengthened by `extend` [m] along its end tangents.
+
+    Args:
+        points: (k, 3) ordered [m].  normals: (k, 3) outward, roughly.
+    """
+    if extend > 0:
+        reach = max(2, min(len(points) - 1, round(0.012 / max(step, 1e-9))))
+        head, tail = unit(points[0] - points[reach]), unit(points[-1] - points[-1 - reach])
+        extra = np.arange(1, int(np.ceil(extend / step)) + 1)[:, None] * step
+        points = np.concatenate([(points[0] + extra * head)[::-1], points, points[-1] + extra * tail])
+        normals = np.concatenate([np.repeat(normals[:1], len(extra), 0), normals, np.repeat(normals[-1:], len(extra), 0)])
+    s = arc_length(points)
+    at = np.arange(0.0, s[-1] + 1e-9, step)
+    even = interpolate(s, points, at)
+    return _with_axes(even, interpolate(s, normals, at), step)
+
+
+def _with_axes(points: Float[ndarray, "m 3"], normals: Float[ndarray, "m 3"], step: float) -> Rail:
+    t = tangents(points)
+    e = unit(np.cross(normals, t))
+    return Rail(points, t, e, np.cross(t, e), step)
+
+
+def shift_rail(rail: Rail, x: Float[ndarray, "m"], h: Float[ndarray, "m"], tilt: Float[ndarray, "m"], respace: bool = True) -> Rail:
+    """The rail moved by x to the left and h outward, its normal leaned so that `tilt` (dh/dx) becomes level."""
+    points = rail.points + x[:, None] * rail.e + h[:, None] * rail.n
+    lateral = rail.e + tilt[:, None] * rail.n
+    t = tangents(points)
+    n = unit(np.cross(t, lateral))
+    return make_rail(points, n, rail.step) if respace else _with_axes(points, n, rail.step)
+
+
+def lay_out(rail: Rail, points: Float[ndarray, "k 3"], origins: Float[ndarray, "k 3"] | None) -> Strip:
+    """Every point in the rail's coordinates.
+
+    Args:
+        points: (k, 3) [m].  origins: (k, 3) where the camera that saw each point stood, or None.
+    """
+    station = cKDTree(rail.points).query(points)[1]
+    offset = points - rail.points[station]
+    along = np.einsum("ij,ij->i", offset, rail.t[station])
+    # Axes between stations: without this, a curved rail's points jump by curvature * x * half a step.
+    other = np.clip(station + np.where(along > 0, 1, -1), 0, len(rail) - 1)
+    u = np.clip(np.abs(along) / rail.step, 0.0, 1.0)[:, None]
+    e = rail.e[station] * (1 - u) + rail.e[other] * u
+    n = rail.n[station] * (1 - u) + rail.n[other] * u
+    base = rail.points[station] * (1 - u) + rail.points[other] * u
+    offset = points - base
+    x, h = np.einsum("ij,ij->i", offset, e), np.einsum("ij,ij->i", offset, n)
+    s = station * rail.step + along
+    if origins is None:
+        return Strip(station, s, x, h, np.zeros((len(points), 2)), np.full(len(points), np.inf))
+    sight = unit(points - origins)
+    inward = np.maximum(-np.einsum("ij,ij->i", sight, n), 0.2)
+    slope = np.stack([np.einsum("ij,ij->i", sight, rail.t[station]), np.einsum("ij,ij->i", sight, e)], axis=1) / inward[:, None]
+    above = np.einsum("ij,ij->i", origins - base, n)
+    return Strip(station, s, x, h, slope, above)

@@ -1,0 +1,277 @@
+"""One candidate groove, from a coarse line to a fitted one: rail, parent surface, cross-section, lateral track."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from weldsim.curves import resample
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.grid import Grid, make_grid
+from weldsim.seam.profile.parent import Parent, fit_parent
+from weldsim.seam.profile.rail import Rail, lay_out, make_rail, shift_rail
+from weldsim.seam.profile.section import Section, fit_section
+from weldsim.seam.profile.smooth import choose_strength, deviation, smooth
+
+EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
+BLOCK = 8  # stations averaged together for the cross-section fit
+LOOK = 0.25  # how much of an independent look one cell of such a block is worth: noise is shared over about 3.5 mm
+TURNS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Where the groove is, station by station.
+
+    Attributes:
+        offset: (m,) lateral position of the middle of the lips relative to the rail [m].
+        weight: (m,) its information, 0 where the groove was not seen.
+        amplitude: (m,) apparent depth over the section's depth: 1 in the groove, 0 beside it; NaN without data.
+        misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
+    """
+
+    offset: Float[ndarray, "m"]
+    weight: Float[ndarray, "m"]
+    amplitude: Float[ndarray, "m"]
+    misfit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A groove measured along a rail that follows the middle of its lips.
+
+    Attributes:
+        inner: half width of the strip about the rail that is kept out of the parent fit [m].
+        sigma: (m,) standard deviation of the rail across the seam [m].
+    """
+
+    rail: Rail
+    parent: Parent
+    grid: Grid
+    section: Section
+    track: Track
+    inner: float
+    sigma: Float[ndarray, "m"]
+
+
+def refine(
+    line: Float[ndarray, "k 3"],
+    normal: Float[ndarray, "3"],
+    points: Float[ndarray, "n 3"],
+    origins: Float[ndarray, "n 3"] | None,
+    config: ProfileConfig,
+) -> Fit | None:
+    """The groove along a coarse line, or None where the data do not carry one.
+
+    Args:
+        line: (k, 3) coarse centre line [m].  normal: outward, roughly.
+        points: (n, 3) [m] near the line.  origins: (n, 3) viewpoints or None.
+    """
+    even = _eased(line, config)
+    if len(even) < 12:
+        return None
+    rail = make_rail(even, np.repeat(normal[None], len(even), 0), config.station_step, EXTEND)
+    inner, outer = 0.5 * config.max_width, 0.5 * config.max_width + config.side_band
+    for _ in range(2):
+        strip = lay_out(rail, points, origins)
+        parent = fit_parent(rail, strip, inner, outer)
+        if np.count_nonzero(sided(parent, config)) * rail.step < 0.7 * config.min_length:
+            return None
+        rail = shift_rail(rail, np.zeros(len(rail)), parent.a, parent.b)
+    strip = lay_out(rail, points, origins)
+    parent = fit_parent(rail, strip, inner, outer)
+    guess = _first_section(make_grid(rail, strip, parent, outer), sided(parent, config))
+    if guess is None:
+        return None
+    section, offset, seen = guess
+    rail = _advance(rail, parent, section, offset, seen)
+    fit = None
+    for turn in range(TURNS):
+        strip = lay_out(rail, points, origins)
+        inner = 0.5 * section.width + 0.7 * section.blur + 0.001
+        parent = fit_parent(rail, strip, inner, inner + config.side_band)
+        grid = make_grid(rail, strip, parent, 0.5 * section.width + section.blur + 0.006)
+        flanked = sided(parent, config)
+        attached = parent.support.max(axis=1) > 0.5
+        section = replace(_fit_grid(grid, flanked, parent.noise, section), middle=0.0) if turn < TURNS - 1 else section
+        track = _follow(grid, section, flanked, attached)
+        seen = track.weight > 0
+        if np.count_nonzero(seen) < 12:
+            return None
+        offset, sigma = _smoothed(rail, track)
+        fit = Fit(rail, parent, grid, section, track, inner, sigma)
+        if turn < TURNS - 1:
+            rail = _advance(rail, parent, section, offset, seen)
+    assert fit is not None
+    settled = shift_rail(
+        fit.rail, offset, _opening_height(fit.parent, fit.section, offset), _slope(fit.parent, offset), respace=False
+    )
+    return replace(fit, rail=settled, track=replace(fit.track, offset=fit.track.offset - offset))
+
+
+def sided(parent: Parent, config: ProfileConfig) -> Bool[ndarray, "m"]:
+    """Stations with parent surface on both sides, at one level and of one slope."""
+    level = (parent.step < config.max_side_step) & (parent.angle < config.max_side_angle)
+    return level & (parent.support.min(axis=1) > 0.25)
+
+
+def _eased(line: Float[ndarray, "k 3"], config: ProfileConfig) -> Float[ndarray, "k 3"]:
+    """The coarse line without its cell steps, its ends, which wander into corners, cut by 4 mm."""
+    even = resample(line, config.station_step)
+    cut = min(round(0.004 / config.station_step), (len(even) - 12) // 4)
+    if cut > 0:
+        even = even[cut:-cut]
+    return smooth(even, np.ones(len(even)), 1e5)
+
+
+def _opening_height(parent: Parent, section: Section, offset: Float[ndarray, "m"]) -> Float[ndarray, "m"]:
+    """Height above the rail of the middle of the chord between the lips [m]."""
+    return parent.a + parent.b * offset + parent.c * (offset**2 + (section.width / 2) ** 2)
+
+
+def _slope(parent: Parent, offset: Float[ndarray, "m"]) -> Float[ndarray, "m"]:
+    """Slope of the parent surface across the seam at the opening."""
+    return parent.b + 2 * parent.c * offset
+
+
+def _advance(rail: Rail, parent: Parent, section: Section, offset: Float[ndarray, "m"], seen: Bool[ndarray, "m"]) -> Rail:
+    """The next rail: moved onto the opening where the groove was seen, and lengthened again at both ends."""
+    core = pieces(seen, rail.step)[0]
+    moved = shift_rail(rail, offset, _opening_height(parent, section, offset), _slope(parent, offset), respace=False)
+    return make_rail(moved.points[core], moved.n[core], rail.step, EXTEND)
+
+
+def pieces(seen: Bool[ndarray, "m"], step: float, bridge: float = 0.010) -> list[slice]:
+    """Stretches of `seen` stations, longest first; gaps up to `bridge` [m] are bridged, specks dropped."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], seen.astype(np.int8), [0]])))
+    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    runs = [run for run in runs if run[1] - run[0] >= 5] or runs
+    joined: list[tuple[int, int]] = []
+    for run in runs:
+        if joined and (run[0] - joined[-1][1]) * step <= bridge:
+            joined[-1] = (joined[-1][0], run[1])
+        else:
+            joined.append(run)
+    return [slice(a, b) for a, b in sorted(joined, key=lambda run: run[0] - run[1])]
+
+
+def _first_section(grid: Grid, flanked: Bool[ndarray, "m"]) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
+    """A first guess: each station's centroid, smoothed, and the mean profile's width and depth."""
+    filled = np.where(np.isfinite(grid.depth), np.maximum(grid.depth, 0.0), 0.0)
+    kernel = np.ones(9) / 9
+    smoothed = np.apply_along_axis(lambda column: np.convolve(column, kernel, mode="same"), 0, filled)
+    middle = np.abs(grid.x) < 0.016
+    if np.count_nonzero(flanked) < 12:
+        return None
+    depth = float(np.median(smoothed[flanked], axis=0)[middle].max(initial=0.0))
+    if depth <= 0:
+        return None
+    window = smoothed * middle * (smoothed > 0.35 * depth)
+    mass = window.sum(axis=1)
+    seen = flanked & (mass > 0.3 * np.median(mass[flanked]))
+    if np.count_nonzero(seen) < 12:
+        return None
+    centroid = np.where(seen, (window @ grid.x) / np.maximum(mass, 1e-12), 0.0)
+    offset = smooth(centroid[:, None], seen.astype(float), 1e4)[:, 0]
+    shifted = np.stack([np.interp(grid.x, grid.x - o, row) for o, row in zip(offset[seen], filled[seen], strict=True)])
+    mean = shifted.mean(axis=0)
+    depth = max(float(mean[middle].max()), 1e-4)
+    width = float(np.count_nonzero(mean[middle] > 0.5 * depth) * (grid.x[1] - grid.x[0]))
+    section = Section(middle=0.0, width=1.4 * width, depth=1.15 * depth, floor=0.1, lean=0.0, blur=0.003)
+    return section, offset, seen
+
+
+def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section) -> Section:
+    """The section fitted to blocks of stations, each with its own shear."""
+    m = len(grid.depth) // BLOCK
+    use = grid.depth[: m * BLOCK].reshape(m, BLOCK, -1)
+    known = np.isfinite(use)
+    number = known.sum(axis=1)
+    mean = np.where(known, use, 0.0).sum(axis=1) / np.maximum(number, 1)
+    shear = np.repeat(grid.shear[: m * BLOCK].reshape(m, BLOCK).mean(axis=1)[:, None], mean.shape[1], axis=1)
+    x = np.broadcast_to(grid.x, mean.shape)
+    # Only blocks that hold a groove of about the usual depth shape the section: ends and gaps would blunt it.
+    inside = np.abs(grid.x) < 0.25 * start.width
+    height = (mean * number)[:, inside].sum(axis=1) / np.maximum(number[:, inside].sum(axis=1), 1)
+    candidates = flanked[: m * BLOCK].reshape(m, BLOCK).all(axis=1) & (height > 0.25 * start.depth)
+    if not candidates.any():
+        return start
+    typical = np.median(height[candidates])
+    keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
+    rows = np.repeat(keep[:, None], mean.shape[1], axis=1) & (number > 0)
+    weight = LOOK * number[rows] / BLOCK
+    return fit_section(x[rows], shear[rows], mean[rows], weight, start, max(noise, 5e-5))
+
+
+def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], attached: Bool[ndarray, "m"]) -> Track:
+    """Lateral position and amplitude at every station, by one Gauss-Newton step each on the fitted section.
+
+    Args:
+        flanked: (m,) stations with parent surface on both sides.  attached: (m,) on one side at least: there a groove
+            that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
+    """
+    shear = np.repeat(grid.shear[:, None], len(grid.x), axis=1)
+    x = np.broadcast_to(grid.x, shear.shape)
+    model = section.depth_at(x, shear)
+    delta = 1e-4
+    slope = (section.depth_at(x - delta, shear) - section.depth_at(x + delta, shear)) / (2 * delta)
+    known = np.isfinite(grid.depth)
+    # Inside the groove a stereo camera is about twice as noisy as on the plate.
+    weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
+    depth = np.where(known, grid.depth, 0.0)
+    terms = [slope * slope, model * model, slope * (depth - model), model * depth]
+    ss, mm, sd, md = _window_sum(np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)).T
+    full = np.quantile(mm, 0.8)
+    enough = (mm > 0.35 * full) & (ss > 0)
+    amplitude = np.where(enough, md / np.maximum(mm, 1e-18), np.nan)
+    groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
+    seen = groove & flanked
+    shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
+    shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
+    weights = np.where(seen, ss, 0.0) + np.where(groove & attached & ~flanked & _between(seen), 0.1 * ss, 0.0)
+    if seen.any():
+        about = np.abs(shift - np.median(shift[seen]))
+        spread = 1.4826 * float(np.median(about[seen]))
+        weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
+    return Track(shift, weights, amplitude, _misfit(np.where(known, depth - model, 0.0), depth, known, seen))
+
+
+def _between(seen: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
+    """Stations after the first and before the last one seen."""
+    return (np.cumsum(seen) > 0) & (np.cumsum(seen[::-1])[::-1] > 0)
+
+
+def _misfit(
+    residual: Float[ndarray, "m w"], depth: Float[ndarray, "m w"], known: Bool[ndarray, "m w"], seen: Bool[ndarray, "m"]
+) -> float:
+    """rms of the residual over the rms of the depth, both averaged over blocks of stations where the groove was seen."""
+    m = len(seen) // BLOCK
+    use = (known & seen[:, None])[: m * BLOCK].reshape(m, BLOCK, -1)
+    number = np.maximum(use.sum(axis=1), 1)
+    sums = [((image[: m * BLOCK].reshape(m, BLOCK, -1) * use).sum(axis=1) / number) ** 2 for image in (residual, depth)]
+    total = float(sums[1].sum())
+    return float(np.sqrt(sums[0].sum() / total)) if total > 0 else 1.0
+
+
+def _window_sum(values: Float[ndarray, "m k"]) -> Float[ndarray, "m k"]:
+    """Sum over each station and its three neighbours on either side, about as far as a stereo camera's noise reaches."""
+    total = np.cumsum(np.concatenate([np.zeros((4, values.shape[1])), values, np.zeros((3, values.shape[1]))]), axis=0)
+    return total[7:] - total[:-7]
+
+
+def _smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:
+    """Lateral offset that puts the rail on the smooth curve through the stations, and its standard deviation [m].
+
+    Beyond the stations seen, the offset stays what it was at the last one.
+    """
+    seen = np.nonzero(track.weight > 0)[0]
+    core = slice(seen[0], seen[-1] + 1)
+    target = rail.points[core] + track.offset[core, None] * rail.e[core]
+    weight = track.weight[core]
+    strength = choose_strength(target, weight)
+    curve = smooth(target, weight, strength)
+    offset = np.einsum("ij,ij->i", curve - rail.points[core], rail.e[core])
+    sigma = deviation(np.where(weight > 0, track.offset[core] - offset, 0.0), weight, strength)
+    pad = (seen[0], len(rail) - seen[-1] - 1)
+    return np.pad(offset, pad, mode="edge"), np.pad(sigma, pad, mode="edge")

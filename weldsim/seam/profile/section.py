@@ -1,0 +1,139 @@
+"""The cross-section a camera would see of a groove: a trapezoid or V sheared by the sight line and blurred by a window.
+
+Coordinates: x to the left on the parent surface, where the sight line meets it; depth below it, in the scale in which
+planes stay planes (inverse depth). A sheared trapezoid stays piecewise linear there, and a stereo camera's support
+window blurs it symmetrically: so the midpoint of the lips is not drawn towards either wall, as a centroid is.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from scipy.optimize import least_squares
+
+LEAN_EVIDENCE = 12.0  # cost, in half squared standard deviations: about 5 sigma
+EDGE = 5e-5  # [m] width given to a vertical wall
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A groove's cross-section.
+
+    Attributes:
+        middle: midpoint of the lips [m].  width: between the lips [m].  depth: of the bottom [m].
+        floor: width of the bottom over `width`, 0 = V, towards 1 = square.
+        lean: how far the bottom's middle is to the left of the lips' [m].
+        blur: width of the camera's support window on the surface [m].
+    """
+
+    middle: float
+    width: float
+    depth: float
+    floor: float
+    lean: float
+    blur: float
+
+    def depth_at(self, x: Float[ndarray, "*k"], shear: Float[ndarray, "*k"]) -> Float[ndarray, "*k"]:
+        """Apparent depth [m] at x [m] where the sight line drifts `shear` to the left for each metre inward."""
+        left, right = self.middle + self.width / 2, self.middle - self.width / 2
+        centre = self.middle + self.lean - self.depth * shear
+        half = self.floor * self.width / 2
+        bottom_left, bottom_right = centre + half, centre - half
+        # A wall steeper than the sight line is hidden: its edge becomes a jump onto what lies behind it.
+        depth_left = np.where(bottom_left < left, self.depth, self.depth * _ratio(left - right, bottom_right - right))
+        depth_right = np.where(bottom_right > right, self.depth, self.depth * _ratio(left - right, left - bottom_left))
+        bl, br = np.minimum(bottom_left, left - EDGE), np.maximum(bottom_right, right + EDGE)
+        bl, br = np.maximum(bl, right + 2 * EDGE), np.minimum(br, left - 2 * EDGE)
+        bl = np.maximum(bl, br + EDGE)
+        dl, dr = np.minimum(depth_left, self.depth), np.minimum(depth_right, self.depth)
+        vertices = [(np.full_like(bl, left), 0.0 * bl), (bl, dl), (br, dr), (np.full_like(bl, right), 0.0 * bl)]
+        return _blurred(x, vertices, self.blur)
+
+
+def _ratio(a: Float[ndarray, "*k"] | float, b: Float[ndarray, "*k"]) -> Float[ndarray, "*k"]:
+    return np.where(b > a, a / np.maximum(b, 1e-12), 1.0)
+
+
+def _blurred(x: Float[ndarray, "*k"], vertices: list[tuple[ndarray, ndarray]], blur: float) -> Float[ndarray, "*k"]:
+    """A polyline (vertices from left to right, 0 outside) averaged over two boxes, `blur` and half of it wide.
+
+    A polyline is a sum of ramps; a ramp averaged over two boxes is a second difference of cubic ramps.
+    """
+    wide = max(blur, 4e-4)
+    narrow = wide / 2
+    slopes = [(d1 - d0) / np.minimum(v1 - v0, -EDGE) for (v0, d0), (v1, d1) in zip(vertices, vertices[1:], strict=False)]
+    changes = [slopes[0], *(b - a for a, b in zip(slopes, slopes[1:], strict=False)), -slopes[-1]]
+    out = np.zeros(np.shape(x))
+    outer, inner = (wide + narrow) / 2, (wide - narrow) / 2
+    for (vertex, _), change in zip(vertices, changes, strict=True):
+        y = vertex - x  # ramps open to the right, where x is smaller
+        ramp = _cube(y + outer) - _cube(y + inner) - _cube(y - inner) + _cube(y - outer)
+        out = out - change * ramp / (wide * narrow)
+    return out
+
+
+def _cube(y: Float[ndarray, "*k"]) -> Float[ndarray, "*k"]:
+    positive = np.maximum(y, 0.0)
+    return positive * positive * positive / 6.0
+
+
+NAMES = ("middle", "width", "depth", "floor", "lean", "blur")
+
+
+def fit_section(
+    x: Float[ndarray, "k"],
+    shear: Float[ndarray, "k"],
+    depth: Float[ndarray, "k"],
+    weight: Float[ndarray, "k"],
+    start: Section,
+    noise: float,
+) -> Section:
+    """The section that fits depths measured at x, by robust weighted least squares.
+
+    It is symmetric unless the data speak against that: `lean` and the lips' middle are nearly exchangeable under blur
+    and noise, so a lean is believed only where it lowers the cost by more than `LEAN_EVIDENCE`.
+
+    Args:
+        x, shear, depth, weight: (k,) cells of the strip; weight = how many independent looks each cell is worth.
+        start: initial values.  noise: standard deviation of one look [m].
+    """
+    plain, cost = _solve(x, shear, depth, weight, start, noise, symmetric=True)
+    leaning, lower = _solve(x, shear, depth, weight, plain, noise, symmetric=False)
+    return leaning if cost - lower > LEAN_EVIDENCE else plain
+
+
+def _solve(
+    x: Float[ndarray, "k"],
+    shear: Float[ndarray, "k"],
+    depth: Float[ndarray, "k"],
+    weight: Float[ndarray, "k"],
+    start: Section,
+    noise: float,
+    *,
+    symmetric: bool,
+) -> tuple[Section, float]:
+    """The best section and its cost (half the sum of squares in units of the noise)."""
+    root = np.sqrt(weight) / max(noise, 1e-6)
+    scale = np.array([1e-3, 1e-3, 1e-3, 0.2, 1e-3, 1e-3])
+    prior = np.array([0.0, 0.0, 0.0, 0.25, 0.1 * start.width, 0.0])
+    first = np.array([getattr(start, name) for name in NAMES])
+    low = np.array([-0.02, 0.002, 1e-4, 0.0, -0.012, 0.0])
+    high = np.array([0.02, 0.045, 0.1, 0.95, 0.012, 0.015])
+    free = np.array([True, True, True, True, not symmetric, True])
+    if symmetric:
+        first[4] = 0.0
+
+    def residuals(theta: ndarray) -> ndarray:
+        full = first.copy()
+        full[free] = theta * scale[free]
+        section = Section(**dict(zip(NAMES, full.tolist(), strict=True)))
+        data = (section.depth_at(x, shear) - depth) * root
+        return np.concatenate([data, [(full[3]) / prior[3], full[4] / prior[4]]])
+
+    bounds = (low[free] / scale[free], high[free] / scale[free])
+    guess = np.clip(first[free] / scale[free], bounds[0] + 1e-6, bounds[1] - 1e-6)
+    solution = least_squares(residuals, guess, bounds=bounds, loss="soft_l1", f_scale=3.0, max_nfev=30, xtol=1e-5, ftol=1e-5)
+    full = first.copy()
+    full[free] = solution.x * scale[free]
+    return Section(**dict(zip(NAMES, full.tolist(), strict=True))), float(solution.cost)

@@ -1,0 +1,225 @@
+"""Where a chart dips between two higher sides: the coarse search for grooves.
+
+A closing (dilation, then erosion) fills every valley narrower than its window and leaves planes of any tilt, steps and
+outer edges alone; what it filled is the valley image. The threshold is chosen from that image's own background.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.chart import Chart
+
+MAX_LINES = 16
+LINE = 0.025  # [m] length over which a valley is averaged along itself
+FAR = 10.0  # [m] stands for "no material" in the closing
+
+
+@dataclass(frozen=True, eq=False)
+class ValleyImage:
+    """Attributes:
+    depth: (h, w) how far the closed surface lies above the measured one [m], 0 where not valid.
+    lined: (h, w) the same averaged along the best of twelve short straight lines through each cell [m].
+    lid: (h, w) the closed surface [m, chart height]: the parent surface across a groove.
+    threshold: depth that counts as valley [m].
+    noise: robust standard deviation of `lined` over the chart [m].
+    """
+
+    depth: Float[ndarray, "h w"]
+    lined: Float[ndarray, "h w"]
+    lid: Float[ndarray, "h w"]
+    threshold: float
+    noise: float
+
+
+def valley_image(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> ValleyImage:
+    """The valley image of a chart, and the threshold its own background asks for, times `factor`."""
+    valid = chart.valid
+    # On the dominant plane's slope a step down the slope would look like a valley; heights are taken off that plane.
+    flat = chart.height - _dominant_plane(chart)
+    sigma = 0.0013 / chart.pitch
+    weight = cv2.GaussianBlur(valid.astype(np.float64), (0, 0), sigma)
+    smooth = cv2.GaussianBlur(np.where(valid, flat, 0.0), (0, 0), sigma) / np.maximum(weight, 1e-6)
+    # A Gaussian straddles depth steps; near one, the measured value is kept.
+    smooth = np.where(np.abs(smooth - flat) > 0.003, flat, smooth)
+    size = max(3, round(config.search_width / chart.pitch) | 1)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    border = size
+    padded = cv2.copyMakeBorder(np.where(valid, smooth, -FAR), border, border, border, border, cv2.BORDER_CONSTANT, value=-FAR)
+    closed = cv2.erode(cv2.dilate(padded, disc), disc, borderType=cv2.BORDER_CONSTANT, borderValue=FAR)
+    lid = closed[border:-border, border:-border]
+    depth = np.where(valid, np.maximum(lid - smooth, 0.0), 0.0)
+    lined = _along_lines(depth, valid, LINE / chart.pitch)
+    background = lined[valid]
+    middle = float(np.median(background))
+    noise = 1.4826 * float(np.median(np.abs(background - middle)))
+    threshold = max(middle + config.detection_factor * noise, config.min_depth) * factor
+    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + chart.height - flat, threshold, noise)
+
+
+def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], length: float) -> Float[ndarray, "h w"]:
+    """Greatest mean of `depth` over straight lines of `length` cells through each cell: noise fades, grooves stay."""
+    half = max(2, round(length / 2))
+    best = np.zeros_like(depth, dtype=np.float32)
+    image = depth.astype(np.float32)
+    for angle in np.arange(12) * np.pi / 12:
+        kernel = np.zeros((2 * half + 1, 2 * half + 1), np.uint8)
+        reach = np.array([np.cos(angle), np.sin(angle)]) * half
+        ends = np.rint(half + np.array([-reach, reach])).astype(int)
+        cv2.line(kernel, (int(ends[0, 0]), int(ends[0, 1])), (int(ends[1, 0]), int(ends[1, 1])), 1)
+        best = np.maximum(best, cv2.filter2D(image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_CONSTANT))
+    return np.where(valid, best, 0.0).astype(float)
+
+
+def _dominant_plane(chart: Chart) -> Float[ndarray, "h w"]:
+    """The plane most of the chart lies in or parallel to, as an image: the median slope of its cells."""
+    h, w = chart.height.shape
+    reach = max(2, min(8, h // 4, w // 4))
+    slopes = []
+    for axis in (0, 1):
+        ahead = np.take(chart.height, np.arange(reach, chart.height.shape[axis]), axis=axis)
+        behind = np.take(chart.height, np.arange(0, chart.height.shape[axis] - reach), axis=axis)
+        both = np.take(chart.valid, np.arange(reach, chart.height.shape[axis]), axis=axis) & np.take(
+            chart.valid, np.arange(0, chart.height.shape[axis] - reach), axis=axis
+        )
+        slopes.append(float(np.median((ahead - behind)[both])) / reach if both.any() else 0.0)
+    return slopes[0] * np.arange(h)[:, None] + slopes[1] * np.arange(w)[None, :]
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseLine:
+    """A valley's centre line before refinement.
+
+    Attributes:
+        points: (k, 3) on the lid, in the cloud's frame [m].
+        evidence: valley depth summed along it [m cells].
+        level: fraction of it with surface at one level on both sides.
+    """
+
+    points: Float[ndarray, "k 3"]
+    evidence: float
+    level: float
+
+
+def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
+    """Coarse centre lines, one for each elongated valley, the strongest first."""
+    seeds = valleys.lined > valleys.threshold
+    extent = (valleys.depth > 0.4 * np.maximum(valleys.lined, valleys.threshold)).astype(np.uint8)
+    if config.min_width / chart.pitch >= 3:  # cell-wide threads run along the steps of outer edges
+        extent = cv2.morphologyEx(extent, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    number, labels, stats, _ = cv2.connectedComponentsWithStats(extent, connectivity=8)
+    minimum = config.min_length / chart.pitch
+    lines = []
+    for label in range(1, number):
+        x, y, w, h, area = stats[label]
+        if np.hypot(w, h) < 0.8 * minimum or area < minimum:
+            continue
+        window = np.s_[y : y + h, x : x + w]
+        mask = labels[window] == label
+        if np.count_nonzero(seeds[window] & mask) < 0.25 * minimum:
+            continue
+        lines += [line + [x, y] for line in _centre_lines(mask, valleys.depth[window], minimum, config.min_width / chart.pitch)]
+    out = []
+    for line in lines:
+        column, row = np.rint(line).astype(int).T
+        points = chart.to_space(line[:, 0], line[:, 1], valleys.lid[row, column])
+        out.append(CoarseLine(points, float(valleys.lined[row, column].sum()), _level_sides(chart, valleys, line)))
+    out.sort(key=lambda line: -line.evidence * line.level)
+    return out[:MAX_LINES]
+
+
+def _level_sides(chart: Chart, valleys: ValleyImage, line: Float[ndarray, "k 2"]) -> float:
+    """Fraction of a line's cells with measured surface near the lid's height, in line, on both sides."""
+    reach = min(4, max(1, len(line) // 4))
+    ahead = line[np.minimum(np.arange(len(line)) + reach, len(line) - 1)] - line[np.maximum(np.arange(len(line)) - reach, 0)]
+    across = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
+    h, w = chart.valid.shape
+    level = np.zeros(len(line), bool)
+    for near in (0.010, 0.014, 0.018, 0.022):
+        heights = []
+        good = np.ones(len(line), bool)
+        for side in (-1, 1):
+            for offset in (near, near + 0.008):
+                column, row = np.rint(line + side * across * offset / chart.pitch).astype(int).T
+                inside = (column >= 0) & (column < w) & (row >= 0) & (row < h)
+                column, row = np.clip(column, 0, w - 1), np.clip(row, 0, h - 1)
+                good &= inside & chart.valid[row, column]
+                heights.append(chart.height[row, column])
+        a, b, c, d = heights  # left near, left far, right near, right far
+        gap, run = 2 * near, 0.008
+        tilt = np.abs((a - b) / run - (d - c) / run)
+        step = np.abs((a - c) + ((a - b) + (d - c)) / (2 * run) * gap)
+        level |= good & (tilt < 0.6) & (step < 0.008)
+    return float(level.mean())
+
+
+def _pixel_length(line: Float[ndarray, "k 2"]) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _centre_lines(
+    mask: Bool[ndarray, "h w"], depth: Float[ndarray, "h w"], minimum: float, clearance: float
+) -> list[Float[ndarray, "k 2"]]:
+    """Paths (column, row) along a mask's middle: the longest geodesic first, then what it left over (branches)."""
+    lines: list[Float[ndarray, "k 2"]] = []
+    remaining = mask.copy()
+    for _ in range(6):
+        number, labels, stats, _ = cv2.connectedComponentsWithStats(remaining.astype(np.uint8), connectivity=8)
+        if number < 2:
+            break
+        label = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+        part = labels == label
+        if stats[label, cv2.CC_STAT_AREA] < minimum:
+            break
+        path, reach = _longest_path(part, depth)
+        if _pixel_length(path) >= 0.8 * minimum:
+            lines.append(path)
+        blot = np.ones_like(mask, np.uint8)
+        blot[np.rint(path[:, 1]).astype(int), np.rint(path[:, 0]).astype(int)] = 0
+        near = cv2.distanceTransform(blot, cv2.DIST_L2, 3) <= max(1.3 * reach, clearance)
+        remaining &= ~(near & part)
+        remaining &= ~part | ~near
+    return lines
+
+
+def _longest_path(part: Bool[ndarray, "h w"], depth: Float[ndarray, "h w"]) -> tuple[Float[ndarray, "k 2"], float]:
+    """The longest geodesic of a connected mask, drawn to its deep middle, as (column, row), and its half width [cells]."""
+    rows, columns = np.nonzero(part)
+    index = np.full(part.shape, -1)
+    index[rows, columns] = np.arange(len(rows))
+    inner = cv2.distanceTransform(np.pad(part, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
+    clipped = np.where(part, depth, 0.0)
+    merit = inner / max(float(inner.max()), 1e-9) * np.minimum(clipped / max(float(np.quantile(clipped[part], 0.9)), 1e-9), 1.0)
+    starts, ends, lengths = [], [], []
+    h, w = part.shape
+    for dr, dc in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        a = np.s_[0 : h - dr, max(0, -dc) : w - max(0, dc)]
+        b = np.s_[dr:h, max(0, dc) : w - max(0, -dc)]
+        both = (index[a] >= 0) & (index[b] >= 0)
+        starts.append(index[a][both])
+        ends.append(index[b][both])
+        lengths.append(np.full(int(both.sum()), np.hypot(dr, dc)))
+    i, j, d = np.concatenate(starts), np.concatenate(ends), np.concatenate(lengths)
+    n = len(rows)
+    plain = coo_matrix((d, (i, j)), (n, n)).tocsr()
+    first = int(np.argmax(_finite(dijkstra(plain, directed=False, indices=0))))
+    second = int(np.argmax(_finite(dijkstra(plain, directed=False, indices=first))))
+    cost = d / (0.05 + (merit[rows[i], columns[i]] + merit[rows[j], columns[j]]) / 2) ** 2
+    weighted = coo_matrix((cost, (i, j)), (n, n)).tocsr()
+    _, before = dijkstra(weighted, directed=False, indices=first, return_predecessors=True)
+    order = [second]
+    while order[-1] != first and before[order[-1]] >= 0:
+        order.append(int(before[order[-1]]))
+    path = np.array(order[::-1])
+    reach = float(np.median(inner[rows[path], columns[path]]))
+    return np.stack([columns[path], rows[path]], axis=1).astype(float), reach
+
+
+def _finite(distance: Float[ndarray, "n"]) -> Float[ndarray, "n"]:
+    return np.where(np.isfinite(distance), distance, -1.0)
