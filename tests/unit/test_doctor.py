@@ -111,3 +111,13 @@ def test_every_library_of_a_machine_that_was_set_up_imports_and_none_is_left_beh
     assert all(check.ok or check.remedy for check in checks)
     assert all("\n" not in check.detail + check.remedy for check in checks)
     assert not {"open3d", "numba"} & (set(sys.modules) - before)
+
+
+def test_ray_casting_counts_only_where_its_library_loads(tmp_path, monkeypatch):
+    (tmp_path / "open3d.py").write_text('raise ImportError("libEGL.so.1: cannot open shared object file: No such file")\n')
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    assert doctor.check_rendering().detail.startswith("embree")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    check = doctor.check_rendering()
+    assert not check.ok
+    assert "libegl1" in check.remedy
