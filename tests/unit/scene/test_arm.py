@@ -71,7 +71,7 @@ def test_flange_agrees_with_a_real_arms_log(arm: mujoco.MjModel, real_data: Path
 
 def test_masses_limits_and_inertias(arm: mujoco.MjModel) -> None:
     masses = [arm.body(name).mass[0] for name in LINKS]
-    assert masses == [3.7, 8.393, 2.275, 1.219, 1.219, 0.1879]
+    assert masses == [3.7, 8.393, 2.33, 1.219, 1.219, 0.1879]
     assert arm.body_mass.sum() == pytest.approx(18.4, abs=1e-6)
     assert np.allclose(arm.jnt_range, [[-2 * np.pi, 2 * np.pi]] * 6)
     assert np.allclose(arm.jnt_actfrcrange[:, 1], [150, 150, 150, 28, 28, 28])
@@ -79,6 +79,23 @@ def test_masses_limits_and_inertias(arm: mujoco.MjModel) -> None:
     inertia = np.sort(arm.body_inertia[1:], axis=1)
     assert (inertia[:, 0] > 0).all()
     assert (inertia[:, 2] <= inertia[:, 0] + inertia[:, 1]).all()  # a real body's moments obey the triangle inequality
+
+
+def test_torques_are_those_of_a_real_controller(arm: mujoco.MjModel, real_data: Path) -> None:
+    """Inverse dynamics (mass, gravity, rotor inertia; no friction) against the target torques of a real UR5's controller."""
+    model = mujoco.MjModel.from_xml_path(str(asset_path("ur5", "ur5.xml")))
+    model.body_gravcomp[:] = 0.0
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_DAMPER) | int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+    data, errors = mujoco.MjData(model), []
+    for path in sorted((real_data / "ur5_logs").glob("*.npz")):
+        with np.load(path) as log:
+            rows = [log[name][::20, 1:] for name in ("q_target", "qd_target", "qdd_target", "m_target")]
+        for q, qd, qdd, torque in zip(*rows, strict=True):
+            data.qpos[:], data.qvel[:], data.qacc[:] = q, qd, qdd
+            mujoco.mj_inverse(model, data)
+            errors.append(data.qfrc_inverse - torque)
+    rms = np.sqrt(np.square(errors).mean(axis=0))
+    assert (rms < [0.1, 0.5, 0.5, 0.01, 0.01, 0.01]).all(), rms
 
 
 def test_tool_frames(world: World) -> None:
