@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from weldsim.errors import SceneError
 from weldsim.mounts import KINECT_V2, X_WB, X_WC_KINECT
 from weldsim.scene.config import MaterialConfig
 from weldsim.scene.files import asset_path
@@ -58,6 +59,9 @@ def new_cell(material: MaterialConfig) -> Spec:
 
 
 def _add_materials(spec: Spec, part: MaterialConfig) -> None:
+    for key in ("red", "green", "blue"):
+        if not 0 <= getattr(part, key) <= 1:
+            raise SceneError(f"material: {key} {getattr(part, key):g} must be 0 to 1", key=key, limit=(0.0, 1.0))
     for name, (rgb, specular, shininess) in MATERIALS.items():
         spec.add_material(name=name, rgba=[*rgb, 1.0], specular=specular, shininess=shininess)
     gloss = {"matte": (0.05, 0.05), "mill_scale": (0.25, 0.3), "ground": (0.7, 0.7), "black": (0.2, 0.3)}[part.finish]

@@ -21,7 +21,8 @@ class PartPoseConfig:
     """Where the part lies on the table, in the robot base B (table top z = 0).
 
     Attributes:
-        x, y: of the middle of its upper face [m].
+        x: of the middle of its upper face [m].
+        y: of the middle of its upper face [m].
         clearance: between the table and its lowest corner [m].
         yaw: about the vertical [rad].
         tilt: of its upper face from the horizontal [rad].
@@ -57,7 +58,9 @@ class MaterialConfig:
 
     Attributes:
         finish: what a camera sees: dusted matte, mill scale, ground steel, or black.
-        red, green, blue: its colour, 0 to 1.
+        red: of its colour, 0 to 1.
+        green: of its colour, 0 to 1.
+        blue: of its colour, 0 to 1.
     """
 
     finish: Finish = "matte"
@@ -67,15 +70,34 @@ class MaterialConfig:
 
 
 @dataclass(frozen=True)
+class CameraPoseConfig:
+    """An explicit pose of the wrist camera's optical frame in the robot base B.
+
+    Attributes:
+        x: position [m].
+        y: position [m].
+        z: position [m].
+        quaternion_wxyz: orientation; x right, y down, z forward.
+    """
+
+    x: Metre
+    y: Metre
+    z: Metre
+    quaternion_wxyz: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class ViewConfig:
-    """One scan view of the wrist camera, which looks at the middle of the part's upper face.
+    """One scan view of the wrist camera, which looks at the middle of the part's upper face unless told otherwise.
 
     Attributes:
         standoff: from the part along the optical axis [m].
         tilt: of the optical axis from the part's normal [rad].
         heading: direction about the part's normal, from its x, in which the camera stands off when tilted [rad].
         roll: about the optical axis, 0 with the image's right along the part's x [rad].
-        shift_x, shift_y: of the point looked at, in the part's face [m].
+        shift_x: of the point looked at, along the part's x [m].
+        shift_y: of the point looked at, along the part's y [m].
+        camera_in_base: the camera's pose itself; everything above is then not used.
     """
 
     standoff: Metre = 0.40
@@ -84,6 +106,26 @@ class ViewConfig:
     roll: Radian = 0.0
     shift_x: Metre = 0.0
     shift_y: Metre = 0.0
+    camera_in_base: CameraPoseConfig | None = None
+
+    def pose(self, X_BP: Transform) -> Transform:
+        """X_BC, for a part at X_BP.
+
+        Raises:
+            SceneError: a standoff outside 0.1 to 2 m, or a tilt of 80 deg or more.
+        """
+        explicit = self.camera_in_base
+        if explicit is not None:
+            return Transform.from_quaternion(
+                "BC", np.array(explicit.quaternion_wxyz, float), np.array([explicit.x, explicit.y, explicit.z], float)
+            )
+        if not 0.1 <= self.standoff <= 2.0:
+            raise SceneError(f"view: standoff {self.standoff * 1e3:g} mm must be 100 to 2000 mm", key="standoff", limit=(0.1, 2.0))
+        if abs(self.tilt) >= np.radians(80):
+            raise SceneError(
+                f"view: tilt {np.degrees(self.tilt):g} deg must be under 80 deg", key="tilt", limit=float(np.radians(80))
+            )
+        return X_BP @ self.pose_in_part()
 
     def pose_in_part(self) -> Transform:
         """X_PC: the camera looking at the part."""
@@ -100,11 +142,16 @@ class SceneConfig:
     """One scene.
 
     Attributes:
-        name: what it is called.  title: one line for people.
+        name: what it is called.
+        title: one line for people.
         workpiece: which kind of part.
-        plate, groove, centre_line: its dimensions.
-        pose: where it lies.  fixture: what holds it.  material: how it looks.
-        views: where the wrist camera scans from, in order.
+        plate: its dimensions.
+        groove: its groove's cross-section.
+        centre_line: where its groove runs.
+        pose: where it lies.
+        fixture: what holds it.
+        material: how it looks.
+        views: where the wrist camera scans from, in order; one at least.
     """
 
     name: str = "scene"

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from weldsim.errors import UnreachableError
+from weldsim.errors import SceneError, UnreachableError
 from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, inverse
 from weldsim.mounts import D415_640X480, X_FC, X_WB
@@ -118,6 +118,8 @@ def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480
     Raises:
         SceneError: a scene that contradicts itself.
     """
+    if not config.views:
+        raise SceneError(f"scene {config.name!r}: no scan view; give one at least", scene=config.name, key="views")
     workpiece = make_workpiece(config)
     X_BP = part_pose(config.pose, workpiece)
     spec = new_cell(config.material)
@@ -132,7 +134,7 @@ def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480
         X_BP=X_BP,
         X_WB=X_WB,
         known_seams=workpiece.known_seams(X_BP),
-        views=tuple(X_BP @ view.pose_in_part() for view in config.views),
+        views=tuple(view.pose(X_BP) for view in config.views),
         intrinsics=intrinsics,
         labels={i: _label(model, i) for i in range(model.ngeom)},
         qpos=np.array([joint.qposadr[0] for joint in joints]),

@@ -12,7 +12,7 @@ from weldsim.frames import Transform
 from weldsim.kinematics import inverse
 from weldsim.mounts import KINECT_V2, X_FT, X_WC_KINECT
 from weldsim.records import CameraIntrinsics
-from weldsim.scene.config import FixtureConfig, GrooveConfig, PartPoseConfig, SceneConfig, ViewConfig
+from weldsim.scene.config import FixtureConfig, GrooveConfig, MaterialConfig, PartPoseConfig, SceneConfig, ViewConfig
 from weldsim.scene.files import asset_path, scene_names, scene_path
 from weldsim.scene.variations import VariationConfig, vary
 from weldsim.scene.workpieces.centre_line import CentreLineConfig
@@ -183,6 +183,13 @@ def test_view_looks_at_the_part_from_its_standoff(tilt: float, heading: float, r
         assert np.arctan2(lean[1], lean[0]) == pytest.approx(heading)
 
 
+def test_view_can_be_an_explicit_pose() -> None:
+    table = {"views": [{"camera_in_base": {"x": "0 mm", "y": "-450 mm", "z": "420 mm", "quaternion_wxyz": [0.0, 1.0, 0.0, 0.0]}}]}
+    world = build_world(structure(table, SceneConfig))
+    assert np.allclose(world.views[0].p, [0.0, -0.45, 0.42])
+    assert np.allclose(world.views[0].R, np.diag([1.0, -1.0, -1.0]))
+
+
 def test_bad_scenes_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="straight"):
         scene_path("strait")
@@ -200,6 +207,12 @@ def test_bad_scenes_are_refused(tmp_path: Path) -> None:
         build_world(SceneConfig(fixture=FixtureConfig(overlap=0.2)))
     with pytest.raises(SceneError, match="bolts"):
         build_world(SceneConfig(fixture=FixtureConfig(bolts=9)))
+    with pytest.raises(SceneError, match="standoff"):
+        build_world(SceneConfig(views=(ViewConfig(standoff=0.0),)))
+    with pytest.raises(SceneError, match="no scan view"):
+        build_world(SceneConfig(views=()))
+    with pytest.raises(SceneError, match="red"):
+        build_world(SceneConfig(material=MaterialConfig(red=200.0)))
     with pytest.raises(UnreachableError, match="scan view 0"):
         build_world(SceneConfig(pose=PartPoseConfig(y=-1.4))).view_joints()
 

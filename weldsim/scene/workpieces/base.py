@@ -51,7 +51,7 @@ class LabelledMesh:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Box:
-    """A box to collide with: its pose X_PS-like centre and half sizes, in P.
+    """A box to collide with, in P.
 
     Attributes:
         centre: (3,) [m].  half: (3,) half edge lengths [m].  R: (3, 3) orientation in P.

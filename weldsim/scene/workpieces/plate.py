@@ -22,7 +22,9 @@ class PlateConfig:
     """A rectangular plate; P's origin is the middle of its upper face, x along its length.
 
     Attributes:
-        length: along x [m].  width: along y [m].  thickness: along z [m].
+        length: along x [m].
+        width: along y [m].
+        thickness: along z [m].
     """
 
     length: Metre = 0.240
