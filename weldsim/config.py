@@ -15,9 +15,12 @@ from typing import Any
 
 from weldsim.cloud.config import CloudConfig
 from weldsim.errors import ConfigError
+from weldsim.execution.config import ExecutionConfig
 from weldsim.motion.config import MotionConfig
+from weldsim.report.limits import ReportConfig
 from weldsim.schema import describe, structure, to_json
 from weldsim.seam.config import SeamConfig
+from weldsim.sensor.d415 import D415Config
 
 __all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config", "load_toml", "structure", "to_json"]
 
@@ -25,6 +28,9 @@ __all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config",
 @dataclass(frozen=True, kw_only=True)
 class CellConfig:
     """Everything that a job can be told, one table a stage. To add a stage: import its config, add its line here."""
+
+    sensor: D415Config = field(default_factory=D415Config)
+    """How the simulated D415 sees."""
 
     cloud: CloudConfig = field(default_factory=CloudConfig)
     """What is kept of the cloud."""
@@ -34,6 +40,12 @@ class CellConfig:
 
     motion: MotionConfig = field(default_factory=MotionConfig)
     """What motion planning may choose."""
+
+    execution: ExecutionConfig = field(default_factory=ExecutionConfig)
+    """How a trajectory is executed."""
+
+    report: ReportConfig = field(default_factory=ReportConfig)
+    """Limits of the verdict."""
 
 
 def load_toml(path: str | Path) -> dict[str, Any]:

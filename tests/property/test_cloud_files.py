@@ -93,7 +93,7 @@ def is_cloud_or_one_line(read: Callable[[], object], kind: type) -> None:
         assert len(str(result)) < 400
 
 
-EXAMPLES = int(os.environ.get("WELDSIM_FUZZ", "40"))  # a night's worth: WELDSIM_FUZZ=10000
+EXAMPLES = int(os.environ.get("WELDSIM_FUZZ", "25"))  # a night's worth: WELDSIM_FUZZ=10000
 FUZZ = settings(
     max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )

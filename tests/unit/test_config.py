@@ -222,7 +222,7 @@ def test_describe_reads_both_kinds_of_docstring() -> None:
 
 
 def test_reading_a_config_loads_no_heavy_library() -> None:
-    heavy = {"open3d", "mujoco", "numba", "trimesh", "mink", "cv2"}
+    heavy = {"open3d", "mujoco", "numba", "trimesh", "mink", "plotly", "matplotlib"}
     code = f"import sys, weldsim.config; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
