@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from types import TracebackType
-from typing import Self
 
 from jaxtyping import Float
 from numpy import ndarray
@@ -64,7 +63,7 @@ class Robot(ABC):
         """What happened since the last call, in order."""
         return ()
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "Robot":
         self.connect()
         return self
 

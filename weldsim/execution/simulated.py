@@ -89,7 +89,7 @@ class SimulatedRobot(Robot):
         self._q_ref, self._qd_ref = np.array(q_start, float), np.zeros(6)
         self._touching: set[tuple[str, str]] = set()
         self._events: list[Event] = []
-        self._next_frame = 0.0
+        self._next_frame = self.config.frame_period
         self.t = 0.0
         base_R, base_p = self.data.xmat[self._base].reshape(3, 3), self.data.xpos[self._base]
         self._X_BW = Transform("WB", base_R, base_p).inverse()
@@ -141,7 +141,7 @@ class SimulatedRobot(Robot):
     def _advance(self, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> None:
         """One period of physics, the reference running from the last command to (q, qd) on a cubic."""
         h, n = self.period, self._steps
-        u = (np.arange(1, n + 1) / n)[:, None]
+        u = (np.arange(n) / n)[:, None]  # a step is driven by the reference of its beginning
         q0, v0, q1, v1 = self._q_ref, self._qd_ref * h, q, qd * h
         # Cubic Hermite basis and its derivative.
         ref = (1 + 2 * u) * (1 - u) ** 2 * q0 + u * (1 - u) ** 2 * v0 + u**2 * (3 - 2 * u) * q1 + u**2 * (u - 1) * v1

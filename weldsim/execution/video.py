@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, final
+from typing import Any, final
 
 import cv2
 import mujoco
@@ -67,7 +67,7 @@ class WeldVideo:
         """Simulated time between pictures [s]: what `SimulationConfig.frame_period` must be."""
         return self.config.speedup / self.config.fps
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "WeldVideo":
         size = (self.config.width, self.config.height)
         # OpenCV reports a missing folder only by a writer that is not open.
         self._writer = cv2.VideoWriter(str(self._part), cv2.VideoWriter.fourcc(*"mp4v"), self.config.fps, size)

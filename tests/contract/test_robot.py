@@ -1,0 +1,89 @@
+"""What every Robot does, whichever it is: one suite for all implementations."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tests.arm_worlds import bare_model
+from tests.torch_paths import START
+from weldsim.errors import ExecutionError
+from weldsim.execution.robot import Robot
+from weldsim.execution.simulated import SimulatedRobot
+from weldsim.kinematics import torch_pose
+
+ROBOTS: dict[str, Callable[[], Robot]] = {"simulated": lambda: SimulatedRobot(bare_model(), START)}
+STILL = np.zeros(6)
+
+
+@pytest.fixture(params=ROBOTS)
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return ROBOTS[request.param]()
+
+
+def test_command_before_connect_is_refused(robot: Robot) -> None:
+    with pytest.raises(ExecutionError, match="connect"):
+        robot.servo(START, STILL)
+
+
+def test_state_is_consistent_and_moves_with_time(robot: Robot) -> None:
+    with robot:
+        before = robot.state()
+        assert np.abs(before.q - START).max() < 1e-3
+        robot.servo(START, STILL)
+        after = robot.state()
+        assert np.isclose(after.t - before.t, robot.period)
+        reached = torch_pose(after.q)
+        assert np.abs(reached.p - after.X_BT.p).max() < 1e-5
+        assert np.abs(reached.R - after.X_BT.R).max() < 1e-5
+
+
+def test_servo_returns_what_was_sent_and_gets_there(robot: Robot) -> None:
+    with robot:
+        steps = 60
+        for k in range(1, steps + 1):
+            u = k / steps
+            q = START + 0.05 * (3 * u**2 - 2 * u**3)
+            qd = np.full(6, 0.05 * (6 * u - 6 * u**2) / (steps * robot.period))
+            assert (robot.servo(q, qd) == q).all()
+        for _ in range(20):
+            robot.servo(START + 0.05, STILL)
+        assert np.abs(robot.state().q - START - 0.05).max() < 1e-3
+
+
+def test_stop_drops_the_arc_and_rests_within_300_ms(robot: Robot) -> None:
+    with robot:
+        speed = np.array([1.0, -0.5, 0.5, 1.0, -1.0, 1.0])
+        for k in range(1, 40):
+            u = min(1.0, k * robot.period / 0.2)
+            robot.set_arc(k > 20)
+            robot.servo(robot.state().q + speed * u * robot.period, speed * u)
+        assert robot.arc
+        began = robot.state().t
+        robot.stop()
+        assert not robot.arc
+        assert robot.state().t - began <= 0.3
+        assert np.abs(robot.state().qd).max() < 0.02
+        where = robot.state().q
+        robot.servo(where, STILL)
+        assert np.abs(robot.state().q - where).max() < 1e-3
+
+
+def test_leaving_the_block_drops_the_arc_even_on_an_error(robot: Robot) -> None:
+    def weld_and_fail() -> None:
+        with robot:
+            robot.set_arc(True)
+            robot.servo(START, STILL)
+            raise RuntimeError("in mid-weld")
+
+    with pytest.raises(RuntimeError, match="in mid-weld"):
+        weld_and_fail()
+    assert not robot.arc
+    with pytest.raises(ExecutionError):
+        robot.servo(START, STILL)
+
+
+def test_disconnect_without_connect_is_harmless(robot: Robot) -> None:
+    robot.disconnect()
+    robot.disconnect()
+    assert not robot.arc
