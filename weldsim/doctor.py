@@ -110,17 +110,25 @@ def remedy_for(distribution: str, failure: str) -> str:
 def check_rendering() -> Check:
     """Which rendering back end draws; without OpenGL the ray-cast one does, so that is no failure."""
     program = (
-        "from weldsim.sensor.backend import rendering_backend as r, backend_failures as f; print(r(), *f().values(), sep='\\n')"
+        "from weldsim.sensor.backend import backend_failures, rendering_backend\n"
+        "backend = rendering_backend()\n"
+        "if backend == 'embree': import open3d\n"
+        "print(backend, *backend_failures().values(), sep='\\n')"
     )
     run = _run(program)
     if isinstance(run, str) or run.returncode:
         failure = run if isinstance(run, str) else _last_line(run.stderr)
-        return Check(name="rendering", ok=False, detail=failure, remedy=f"unset MUJOCO_GL, or {_GL_REMEDY}")
+        return Check(name="rendering", ok=False, detail=failure, remedy=_rendering_remedy(failure))
     backend, *failures = run.stdout.strip().splitlines()
     if backend == "embree":
         why = f" ({'; '.join(failures)})" if failures else ""
         return Check(name="rendering", ok=True, detail=f"embree: ray casting, no OpenGL{why}", remedy=_GL_REMEDY)
     return Check(name="rendering", ok=True, detail=f"{backend}: OpenGL")
+
+
+def _rendering_remedy(failure: str) -> str:
+    """What to do where nothing draws."""
+    return "unset MUJOCO_GL" if "MUJOCO_GL" in failure else _GL_REMEDY
 
 
 def check_writable(name: str, folder: Path) -> Check:
