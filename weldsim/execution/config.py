@@ -1,6 +1,6 @@
 """How the simulated arm's controller behaves, and how a trajectory is run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from weldsim.errors import ConfigError
 from weldsim.quantity import Radian, Second
@@ -44,6 +44,8 @@ class ExecutionConfig:
     """Greatest distance of any joint from the trajectory's first point (0.5 deg): otherwise nothing moves."""
     settle: Second = 0.2
     """Time the last point is held, so that the log ends with the arm at rest."""
+    simulation: SimulationConfig = field(default_factory=SimulationConfig)
+    """How the simulated arm behaves."""
 
     def __post_init__(self) -> None:
         if not self.start_tolerance > 0 or self.settle < 0:
