@@ -81,7 +81,7 @@ def refine(
         rail = shift_rail(rail, np.zeros(len(rail)), parent.a, parent.b)
     strip = lay_out(rail, points, origins)
     parent = fit_parent(rail, strip, inner, outer)
-    guess = _first_section(make_grid(rail, strip, parent, outer), sided(parent, config))
+    guess = _first_section(make_grid(rail, strip, parent, outer), sided(parent, config), attached(parent))
     if guess is None:
         return None
     section, offset, seen = guess
@@ -93,9 +93,8 @@ def refine(
         parent = fit_parent(rail, strip, inner, inner + config.side_band)
         grid = make_grid(rail, strip, parent, 0.5 * section.width + section.blur + 0.006)
         flanked = sided(parent, config)
-        attached = parent.support.max(axis=1) > 0.5
         section = replace(_fit_grid(grid, flanked, parent.noise, section), middle=0.0) if turn < TURNS - 1 else section
-        track = _follow(grid, section, flanked, attached)
+        track = _follow(grid, section, flanked, attached(parent))
         seen = track.weight > 0
         if np.count_nonzero(seen) < 12:
             return None
@@ -114,6 +113,11 @@ def sided(parent: Parent, config: ProfileConfig) -> Bool[ndarray, "m"]:
     """Stations with parent surface on both sides, at one level and of one slope."""
     level = (parent.step < config.max_side_step) & (parent.angle < config.max_side_angle)
     return level & (parent.support.min(axis=1) > 0.25)
+
+
+def attached(parent: Parent) -> Bool[ndarray, "m"]:
+    """Stations with parent surface on one side at least."""
+    return parent.support.max(axis=1) > 0.5
 
 
 def _eased(line: Float[ndarray, "k 3"], config: ProfileConfig) -> Float[ndarray, "k 3"]:
@@ -156,7 +160,7 @@ def pieces(seen: Bool[ndarray, "m"], step: float, bridge: float = 0.010) -> list
     return [slice(a, b) for a, b in sorted(joined, key=lambda run: run[0] - run[1])]
 
 
-def _first_section(grid: Grid, flanked: Bool[ndarray, "m"]) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
+def _first_section(grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
     """A first guess: each station's centroid, smoothed, and the mean profile's width and depth."""
     filled = np.where(np.isfinite(grid.depth), np.maximum(grid.depth, 0.0), 0.0)
     kernel = np.ones(9) / 9
@@ -169,7 +173,8 @@ def _first_section(grid: Grid, flanked: Bool[ndarray, "m"]) -> tuple[Section, Fl
         return None
     window = smoothed * middle * (smoothed > 0.35 * depth)
     mass = window.sum(axis=1)
-    seen = flanked & (mass > 0.3 * np.median(mass[flanked]))
+    groove = mass > 0.3 * np.median(mass[flanked])
+    seen = groove & (flanked | (held & _between(groove & flanked)))
     if np.count_nonzero(seen) < 12:
         return None
     centroid = np.where(seen, (window @ grid.x) / np.maximum(mass, 1e-12), 0.0)
@@ -204,11 +209,11 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     return fit_section(x[rows], shear[rows], mean[rows], weight, start, max(noise, 5e-5))
 
 
-def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], attached: Bool[ndarray, "m"]) -> Track:
+def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> Track:
     """Lateral position and amplitude at every station, by one Gauss-Newton step each on the fitted section.
 
     Args:
-        flanked: (m,) stations with parent surface on both sides.  attached: (m,) on one side at least: there a groove
+        flanked: (m,) stations with parent surface on both sides.  held: (m,) on one side at least: there a groove
             that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
     """
     shear = np.repeat(grid.shear[:, None], len(grid.x), axis=1)
@@ -229,7 +234,7 @@ def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], attached:
     seen = groove & flanked
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
     shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
-    weights = np.where(seen, ss, 0.0) + np.where(groove & attached & ~flanked & _between(seen), 0.1 * ss, 0.0)
+    weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & _between(seen), 0.1 * ss, 0.0)
     if seen.any():
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))

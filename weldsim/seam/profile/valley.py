@@ -42,7 +42,8 @@ def valley_image(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> Va
     """The valley image of a chart, and the threshold its own background asks for, times `factor`."""
     valid = chart.valid
     # On the dominant plane's slope a step down the slope would look like a valley; heights are taken off that plane.
-    flat = chart.height - _dominant_plane(chart)
+    plane = _dominant_plane(chart)
+    flat = _without_spikes(chart.height - plane, valid)
     sigma = 0.0013 / chart.pitch
     weight = cv2.GaussianBlur(valid.astype(np.float64), (0, 0), sigma)
     smooth = cv2.GaussianBlur(np.where(valid, flat, 0.0), (0, 0), sigma) / np.maximum(weight, 1e-6)
@@ -60,7 +61,7 @@ def valley_image(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> Va
     middle = float(np.median(background))
     noise = 1.4826 * float(np.median(np.abs(background - middle)))
     threshold = max(middle + config.detection_factor * noise, config.min_depth) * factor
-    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + chart.height - flat, threshold, noise)
+    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + plane, threshold, noise)
 
 
 def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], length: float) -> Float[ndarray, "h w"]:
@@ -75,6 +76,13 @@ def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], leng
         cv2.line(kernel, (int(ends[0, 0]), int(ends[0, 1])), (int(ends[1, 0]), int(ends[1, 1])), 1)
         best = np.maximum(best, cv2.filter2D(image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_CONSTANT))
     return np.where(valid, best, 0.0).astype(float)
+
+
+def _without_spikes(height: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"]) -> Float[ndarray, "h w"]:
+    """Heights with lone cells far off their surroundings (stray points) set to the local median."""
+    filled = np.where(valid, height, cv2.medianBlur(np.where(valid, height, -FAR).astype(np.float32), 5))
+    median = cv2.medianBlur(filled.astype(np.float32), 5)
+    return np.where(valid & (np.abs(height - median) > 0.003) & (median > -0.5 * FAR), median, height)
 
 
 def _dominant_plane(chart: Chart) -> Float[ndarray, "h w"]:
@@ -99,7 +107,7 @@ class CoarseLine:
     Attributes:
         points: (k, 3) on the lid, in the cloud's frame [m].
         evidence: valley depth summed along it [m cells].
-        level: fraction of it with surface at one level on both sides.
+        level: fraction of it with surface at one level on both sides; tails without are cut off.
     """
 
     points: Float[ndarray, "k 3"]
@@ -129,13 +137,29 @@ def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> 
     for line in lines:
         column, row = np.rint(line).astype(int).T
         points = chart.to_space(line[:, 0], line[:, 1], valleys.lid[row, column])
-        out.append(CoarseLine(points, float(valleys.lined[row, column].sum()), _level_sides(chart, valleys, line)))
+        level = _level_sides(chart, line)
+        keep = _longest_run(level, round(0.020 / chart.pitch))
+        if (keep.stop - keep.start) * chart.pitch < 0.6 * config.min_length:
+            keep = slice(0, len(line))
+        evidence = float(valleys.lined[row[keep], column[keep]].sum())
+        out.append(CoarseLine(points[keep], evidence, float(level[keep].mean())))
     out.sort(key=lambda line: -line.evidence * line.level)
     return out[:MAX_LINES]
 
 
-def _level_sides(chart: Chart, valleys: ValleyImage, line: Float[ndarray, "k 2"]) -> float:
-    """Fraction of a line's cells with measured surface near the lid's height, in line, on both sides."""
+def _longest_run(level: Bool[ndarray, "k"], bridge: int) -> slice:
+    """The longest stretch of true cells, gaps of up to `bridge` cells bridged."""
+    index = np.flatnonzero(level)
+    if len(index) == 0:
+        return slice(0, 0)
+    cuts = np.flatnonzero(np.diff(index) > bridge)
+    starts, stops = np.concatenate([[0], cuts + 1]), np.concatenate([cuts, [len(index) - 1]])
+    best = int(np.argmax(index[stops] - index[starts]))
+    return slice(int(index[starts[best]]), int(index[stops[best]]) + 1)
+
+
+def _level_sides(chart: Chart, line: Float[ndarray, "k 2"]) -> Bool[ndarray, "k"]:
+    """Which of a line's cells have surface on both sides that lies in one plane across it."""
     reach = min(4, max(1, len(line) // 4))
     ahead = line[np.minimum(np.arange(len(line)) + reach, len(line) - 1)] - line[np.maximum(np.arange(len(line)) - reach, 0)]
     across = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
@@ -156,7 +180,7 @@ def _level_sides(chart: Chart, valleys: ValleyImage, line: Float[ndarray, "k 2"]
         tilt = np.abs((a - b) / run - (d - c) / run)
         step = np.abs((a - c) + ((a - b) + (d - c)) / (2 * run) * gap)
         level |= good & (tilt < 0.6) & (step < 0.008)
-    return float(level.mean())
+    return level
 
 
 def _pixel_length(line: Float[ndarray, "k 2"]) -> float:
