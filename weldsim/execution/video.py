@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from weldsim.errors import ConfigError, OutputError
+from weldsim.errors import ConfigError, OutputError, SensorError
 from weldsim.execution.simulated import TORCH_SITE, SimulatedRobot
 
 BEAD_SPACING, BEAD_RADIUS = 0.0012, 0.0032  # [m]
@@ -121,12 +121,12 @@ class WeldVideo:
         visual.quality.shadowsize = min(visual.quality.shadowsize, SHADOW)
         visual.quality.numslices, visual.quality.numstacks = 16, 8
         model.mat_reflectance[:] = 0.0
-        self._renderers.append((config.camera, mujoco.Renderer(model, config.height, config.width)))
+        self._renderers.append((config.camera, _renderer(model, config.height, config.width)))
         if config.inset:
             follower = mujoco.MjvCamera()
             follower.type = mujoco.mjtCamera.mjCAMERA_FREE
             follower.azimuth, follower.elevation, follower.distance = CLOSE_UP
-            self._renderers.append((follower, mujoco.Renderer(model, config.height * 2 // 5, config.width * 3 // 10)))
+            self._renderers.append((follower, _renderer(model, config.height * 2 // 5, config.width * 3 // 10)))
 
     def _lay_bead(self, robot: SimulatedRobot) -> None:
         """Balls from the last one to the tip while the arc burns."""
@@ -149,6 +149,20 @@ class WeldVideo:
             _ball(scene, tip, 0.0045, [1.0, 1.0, 0.97, 1.0], emission=1.0)
             for radius, alpha in ((0.010, 0.35), (0.018, 0.18), (0.030, 0.08)):
                 _ball(scene, tip, radius, [0.75, 0.87, 1.0, alpha], emission=1.0)
+
+
+def _renderer(model: Any, height: int, width: int) -> Any:
+    """MuJoCo's renderer. Raises SensorError where there is no OpenGL."""
+    try:
+        return mujoco.Renderer(model, height, width)
+    except (AttributeError, ImportError, RuntimeError, mujoco.FatalError) as error:
+        # Without a back end, MuJoCo fails in whichever way its platform does: a missing context class among them.
+        raise SensorError(
+            f"video: no OpenGL back end ({type(error).__name__}: {error}); `weldsim doctor` says what is missing,"
+            " or leave the video out",
+            backend=os.environ.get("MUJOCO_GL", ""),
+            reason=str(error),
+        ) from error
 
 
 def _shown() -> Any:
