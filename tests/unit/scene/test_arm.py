@@ -132,6 +132,28 @@ def test_gravity_acts_when_the_servos_are_off(world: World) -> None:
     assert np.abs(data.qpos - before).max() > 0.05
 
 
+def outside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, points: np.ndarray) -> np.ndarray:
+    """Signed distance of points [m] from a capsule or cylinder."""
+    local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+    radius, half = model.geom_size[geom, :2]
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        local[:, 2] -= np.clip(local[:, 2], -half, half)
+        return np.linalg.norm(local, axis=1) - radius
+    across, along = np.hypot(local[:, 0], local[:, 1]) - radius, np.abs(local[:, 2]) - half
+    return np.minimum(np.maximum(across, along), 0) + np.hypot(np.maximum(across, 0), np.maximum(along, 0))
+
+
+def test_collision_bodies_enclose_what_is_seen(arm: mujoco.MjModel) -> None:
+    data = mujoco.MjData(arm)
+    mujoco.mj_kinematics(arm, data)
+    for geom in np.flatnonzero(arm.geom_type == mujoco.mjtGeom.mjGEOM_MESH):
+        mesh = arm.geom_dataid[geom]
+        vertices = arm.mesh_vert[arm.mesh_vertadr[mesh] :][: arm.mesh_vertnum[mesh]]
+        points = vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+        same = np.flatnonzero((arm.geom_bodyid == arm.geom_bodyid[geom]) & (arm.geom_contype > 0))
+        assert np.min([outside(arm, data, i, points) for i in same], axis=0).max() < 3.5e-3
+
+
 def test_joint_names_are_shared(world: World) -> None:
     for i, name in enumerate(JOINT_NAMES):
         assert world.model.joint(name).qposadr[0] == world.qpos[i]

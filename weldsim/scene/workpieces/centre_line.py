@@ -7,7 +7,6 @@ from typing import Literal, final
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.special import ellipeinc
 
 from weldsim.errors import SceneError
 from weldsim.quantity import Metre
@@ -119,6 +118,8 @@ class SineLine(CentreLine):
         return self.amplitude * self.wavenumber * np.cos(self.wavenumber * x)
 
     def arc_length(self, x: Float[ndarray, "n"]) -> Float[ndarray, "n"]:
+        from scipy.special import ellipeinc  # slow to load, and no other line needs it
+
         # sqrt(1 + a^2 cos^2) = sqrt(1 + a^2) sqrt(1 - m sin^2) with m = a^2 / (1 + a^2): an elliptic integral of the second kind.
         steepest = (self.amplitude * self.wavenumber) ** 2
         return np.sqrt(1 + steepest) / self.wavenumber * ellipeinc(self.wavenumber * x, steepest / (1 + steepest))
