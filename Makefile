@@ -19,11 +19,9 @@ run: set-up  ## the main job: the twin scans, plans and welds the straight and t
 test: set-up  ## all tests
 	@$(BIN)/pytest -n 2
 
-check: set-up  ## lint, format, types, import contracts
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/pyright
-	$(BIN)/lint-imports
+check: set-up  ## lint, format, types, import contracts; all are tried, any failure fails
+	@failed=0; for tool in "ruff check --output-format concise ." "ruff format --check ." pyright lint-imports; do \
+	    echo "== $$tool"; $(BIN)/$$tool || failed=1; done; exit $$failed
 
 format: set-up  ## format and repair what ruff can
 	$(BIN)/ruff format .
@@ -36,8 +34,7 @@ figures: set-up  ## write the measured figures of experiments/results/readme.jso
 	@$(BIN)/python experiments/figures.py
 
 lock: set-up  ## pin every dependency of pyproject.toml in requirements.lock
-	@CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --extra dev \
-	    --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --output-file requirements.lock pyproject.toml
+	@CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/pip-compile --quiet --output-file requirements.lock pyproject.toml
 
 wheel: set-up  ## build dist/weldsim-*.whl
 	@$(BIN)/python -m hatchling build --target wheel
