@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from weldsim.frames import unit
 
@@ -41,7 +41,7 @@ def project(
         s: (m,) its arc length; the first and last segments are not extended.
     """
     length = arc_length(points)
-    _, nearest = cKDTree(points).query(queries)
+    _, nearest = KDTree(points).query(queries)
     best = np.full(len(queries), np.inf)
     foot, at = np.empty((len(queries), queries.shape[1])), np.zeros(len(queries))
     for shift in (-1, 0):

@@ -52,7 +52,7 @@ def inverse(X_BF: Transform) -> Float[ndarray, "k 6"]:
     """All joint solutions [rad] in (-pi, pi] of one flange pose; k is 0 (none) to 8."""
     import ur_analytic_ik
 
-    solutions = ur_analytic_ik.ur5.inverse_kinematics(X_BF.matrix)
+    solutions = ur_analytic_ik.ur5.inverse_kinematics(X_BF.matrix)  # pyright: ignore[reportAttributeAccessIssue] - compiled, untyped
     return np.array([np.asarray(solution, float).reshape(6) for solution in solutions]).reshape(-1, 6)
 
 
