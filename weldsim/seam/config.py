@@ -23,7 +23,7 @@ class ProfileConfig:
         max_side_step: largest height difference between them at the groove [m].
         max_gap: longest stretch without a visible groove that still joins two pieces into one seam [m].
         detection_factor: detection threshold in robust standard deviations of the valley image above its median.
-        points_per_seam: at most this many points are used for the fit of one seam, evenly thinned.
+        points_per_metre: at most this many points for each metre of coarse line are used for its fit [1/m], evenly thinned.
     """
 
     min_width: Metre = 0.0045
@@ -37,7 +37,7 @@ class ProfileConfig:
     max_side_step: Metre = 0.003
     max_gap: Metre = 0.030
     detection_factor: float = 4.0
-    points_per_seam: int = 60_000
+    points_per_metre: float = 100_000.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,7 @@ from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit, refine
 from weldsim.seam.profile.valley import trace_valleys, valley_image
 
+MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
 SURROUNDINGS = 0.042  # [m] points within this of a coarse line take part in its fit
 
 
@@ -41,12 +42,12 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     origins = cloud.sight_origins()
     for coarse in trace_valleys(chart, valleys, config):
         line = coarse.points
-        if coarse.level < 0.25:
+        if coarse.level < MIN_LEVEL:
             rejected.append(_rejection(line, f"surface at one level on both sides over only {coarse.level:.0%} of it"))
             continue
         if any(_covers(fit, line) for fit, _, _ in accepted):
             continue
-        picked = _surroundings(chart, line, config.points_per_seam)
+        picked = _surroundings(chart, line, int(config.points_per_metre * (arc_length(line)[-1] + 2 * SURROUNDINGS)))
         fit = refine(line, normal, cloud.points[picked], None if origins is None else origins[picked], config)
         if fit is None:
             rejected.append(_rejection(line, "no parent surface on both sides at one level"))

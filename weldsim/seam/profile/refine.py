@@ -18,6 +18,9 @@ EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, ea
 BLOCK = 8  # stations averaged together for the cross-section fit
 LOOK = 0.25  # how much of an independent look one cell of such a block is worth: noise is shared over about 3.5 mm
 TURNS = 3
+LATERAL_REACH = 3  # stations on either side that share a look at the lateral position: as far as noise is correlated
+AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
+FIRST_LOOK = 12_000  # points enough to refuse what is no groove
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +46,8 @@ class Fit:
 
     Attributes:
         inner: half width of the strip about the rail that is kept out of the parent fit [m].
-        sigma: (m,) standard deviation of the rail across the seam [m].
+        sigma: (m,) standard deviation of the rail across the seam [m]: of the lateral track with its correlation, of
+            the section's middle, and of the parent surface's height, in quadrature.
     """
 
     rail: Rail
@@ -73,6 +77,9 @@ def refine(
         return None
     rail = make_rail(even, np.repeat(normal[None], len(even), 0), config.station_step, EXTEND)
     inner, outer = 0.5 * config.max_width, 0.5 * config.max_width + config.side_band
+    every, every_origin = points, origins
+    stride = max(1, len(points) // FIRST_LOOK)
+    points, origins = points[::stride], None if origins is None else origins[::stride]
     for _ in range(2):
         strip = lay_out(rail, points, origins)
         parent = fit_parent(rail, strip, inner, outer)
@@ -86,19 +93,23 @@ def refine(
         return None
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
-    fit = None
+    points, origins = every, every_origin
+    fit, doubt = None, 0.0
     for turn in range(TURNS):
         strip = lay_out(rail, points, origins)
         inner = 0.5 * section.width + 0.7 * section.blur + 0.001
         parent = fit_parent(rail, strip, inner, inner + config.side_band)
         grid = make_grid(rail, strip, parent, 0.5 * section.width + section.blur + 0.006)
         flanked = sided(parent, config)
-        section = replace(_fit_grid(grid, flanked, parent.noise, section), middle=0.0) if turn < TURNS - 1 else section
+        if turn < TURNS - 1:
+            section, doubt = _fit_grid(grid, flanked, parent.noise, section)
+            section = replace(section, middle=0.0)
         track = _follow(grid, section, flanked, attached(parent))
         seen = track.weight > 0
         if np.count_nonzero(seen) < 12:
             return None
         offset, sigma = _smoothed(rail, track)
+        sigma = np.sqrt(sigma**2 + parent.sigma**2 + doubt**2)
         fit = Fit(rail, parent, grid, section, track, inner, sigma)
         if turn < TURNS - 1:
             rail = _advance(rail, parent, section, offset, seen)
@@ -187,8 +198,8 @@ def _first_section(grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, 
     return section, offset, seen
 
 
-def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section) -> Section:
-    """The section fitted to blocks of stations, each with its own shear."""
+def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section) -> tuple[Section, float]:
+    """The section fitted to blocks of stations, each with its own shear, and its middle's standard deviation [m]."""
     m = len(grid.depth) // BLOCK
     use = grid.depth[: m * BLOCK].reshape(m, BLOCK, -1)
     known = np.isfinite(use)
@@ -201,7 +212,7 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     height = (mean * number)[:, inside].sum(axis=1) / np.maximum(number[:, inside].sum(axis=1), 1)
     candidates = flanked[: m * BLOCK].reshape(m, BLOCK).all(axis=1) & (height > 0.25 * start.depth)
     if not candidates.any():
-        return start
+        return start, 0.0
     typical = np.median(height[candidates])
     keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
     rows = np.repeat(keep[:, None], mean.shape[1], axis=1) & (number > 0)
@@ -226,10 +237,11 @@ def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Boo
     weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
     depth = np.where(known, grid.depth, 0.0)
     terms = [slope * slope, model * model, slope * (depth - model), model * depth]
-    ss, mm, sd, md = _window_sum(np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)).T
+    each = np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)
+    ss, mm, sd, _ = _window_sum(each, LATERAL_REACH).T
     full = np.quantile(mm, 0.8)
     enough = (mm > 0.35 * full) & (ss > 0)
-    amplitude = np.where(enough, md / np.maximum(mm, 1e-18), np.nan)
+    amplitude = _amplitude(each, enough, flanked)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
@@ -240,6 +252,19 @@ def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Boo
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
     return Track(shift, weights, amplitude, _misfit(np.where(known, depth - model, 0.0), depth, known, seen))
+
+
+def _amplitude(each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked: Bool[ndarray, "m"]) -> Float[ndarray, "m"]:
+    """Apparent depth over the section's at each station, over the shortest window that shows it clearly."""
+    amplitude = np.full(len(each), np.nan)
+    for reach in AMPLITUDE_REACHES:
+        _, mm, _, md = _window_sum(each, reach).T
+        amplitude = np.where(enough, md / np.maximum(mm, 1e-18), np.nan)
+        core = amplitude[enough & flanked]
+        core = core[core > 0.3]
+        if len(core) < 12 or core.std() < 0.22:
+            break
+    return amplitude
 
 
 def _between(seen: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
@@ -259,10 +284,12 @@ def _misfit(
     return float(np.sqrt(sums[0].sum() / total)) if total > 0 else 1.0
 
 
-def _window_sum(values: Float[ndarray, "m k"]) -> Float[ndarray, "m k"]:
-    """Sum over each station and its three neighbours on either side, about as far as a stereo camera's noise reaches."""
-    total = np.cumsum(np.concatenate([np.zeros((4, values.shape[1])), values, np.zeros((3, values.shape[1]))]), axis=0)
-    return total[7:] - total[:-7]
+def _window_sum(values: Float[ndarray, "m k"], reach: int) -> Float[ndarray, "m k"]:
+    """Sum over each station and its neighbours within `reach`."""
+    blank = np.zeros((1, values.shape[1]))
+    edge = np.zeros((reach, values.shape[1]))
+    total = np.cumsum(np.concatenate([blank, edge, values, edge]), axis=0)
+    return total[2 * reach + 1 :] - total[: -2 * reach - 1]
 
 
 def _smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:

@@ -140,7 +140,7 @@ def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> 
         level = _level_sides(chart, line)
         keep = _longest_run(level, round(0.020 / chart.pitch))
         if (keep.stop - keep.start) * chart.pitch < 0.6 * config.min_length:
-            keep = slice(0, len(line))
+            keep = slice(0, len(line))  # stays a candidate only to be named among the refused
         evidence = float(valleys.lined[row[keep], column[keep]].sum())
         out.append(CoarseLine(points[keep], evidence, float(level[keep].mean())))
     out.sort(key=lambda line: -line.evidence * line.level)
