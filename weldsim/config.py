@@ -17,6 +17,7 @@ from weldsim.cloud.config import CloudConfig
 from weldsim.errors import ConfigError
 from weldsim.execution.config import ExecutionConfig
 from weldsim.motion.config import MotionConfig
+from weldsim.path.config import PathConfig
 from weldsim.report.limits import ReportConfig
 from weldsim.schema import describe, structure, to_json
 from weldsim.seam.config import SeamConfig
@@ -37,6 +38,9 @@ class CellConfig:
 
     seam: SeamConfig = field(default_factory=SeamConfig)
     """Which seam finder runs, and its settings."""
+
+    path: PathConfig = field(default_factory=PathConfig)
+    """How the torch is laid along a seam."""
 
     motion: MotionConfig = field(default_factory=MotionConfig)
     """What motion planning may choose."""

@@ -57,6 +57,12 @@ class NoSeamError(WeldsimError):
     exit_code = 1
 
 
+class PathError(WeldsimError):
+    """A torch path cannot be laid along a seam as asked. `data`: length, s, limit."""
+
+    exit_code = 1
+
+
 class MotionError(WeldsimError):
     """The arm cannot do what the path asks. `data`: index, arc length, joint, limit."""
 

@@ -1,0 +1,37 @@
+"""Clouds of several views as one."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from weldsim.errors import CloudError
+from weldsim.records import PointCloud
+
+
+def merge(clouds: Sequence[PointCloud]) -> PointCloud:
+    """The points of all clouds, in order, each with the viewpoint that saw it; a single cloud is returned as it is.
+
+    Normals and colours are kept where every cloud has them. Pixels are lost: they belong to one image.
+
+    Raises:
+        CloudError: no cloud, different frames, or one of several clouds without exactly one viewpoint.
+    """
+    if len(clouds) == 1:
+        return clouds[0]
+    if not clouds:
+        raise CloudError("merge: no cloud was given", clouds=0)
+    for i, cloud in enumerate(clouds):
+        if cloud.frame != clouds[0].frame:
+            raise CloudError(f"merge: cloud {i} is in frame {cloud.frame}, cloud 0 in {clouds[0].frame}", index=i)
+        if len(cloud.viewpoints) != 1:
+            raise CloudError(f"merge: cloud {i} has {len(cloud.viewpoints)} viewpoints, one is needed", index=i)
+    normals = [cloud.normals for cloud in clouds if cloud.normals is not None]
+    colours = [cloud.colours for cloud in clouds if cloud.colours is not None]
+    return PointCloud(
+        points=np.concatenate([cloud.points for cloud in clouds]),
+        frame=clouds[0].frame,
+        normals=np.concatenate(normals) if len(normals) == len(clouds) else None,
+        colours=np.concatenate(colours) if len(colours) == len(clouds) else None,
+        viewpoints=np.concatenate([cloud.viewpoints for cloud in clouds]),
+        view=np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds]),
+    )

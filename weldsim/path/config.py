@@ -1,0 +1,68 @@
+"""PathConfig: how the torch is laid along a seam (read by `weldsim.path.plan`)."""
+
+from dataclasses import dataclass
+
+from weldsim.errors import ConfigError
+from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre
+
+DEGREE_PER_MM: RadianPerMetre = 17.453292519943295  # 1 deg/mm
+STEEPEST: Radian = 1.0471975511965976  # 60 deg
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathConfig:
+    """Settings of `plan_path`. The defaults weld the whole seam along its surface normal."""
+
+    step: Metre = 0.0001
+    """Distance between poses, straight lines and slerp between them (thesis 5.2.5)."""
+
+    speed: MetrePerSecond = 0.008
+    """Torch speed along the weld."""
+
+    smoothing: Metre = 0.005
+    """Wire axis and travel direction are smoothed over this length (standard deviation of a Gaussian in arc length, fitted
+    with local lines so that a steady turn is kept); 0 takes them as the seam has them."""
+
+    turn_limit: RadianPerMetre = DEGREE_PER_MM
+    """Greatest turn of the wire axis per length of seam, before work and travel angle; the default is 1 deg/mm, the turn of
+    a surface bent to a radius of 57 mm. The axis lags where the seam turns faster."""
+
+    work_angle: Radian = 0.0
+    """Lean of the torch across travel, away from the seam's bisector: right-handed about travel, so positive leans it to
+    the right."""
+
+    travel_angle: Radian = 0.0
+    """Lean of the torch along travel: positive pushes (the wire points ahead), negative drags."""
+
+    ctwd: Metre = 0.015
+    """Contact tip to work distance. Where it differs from `nominal_ctwd` the torch is moved along its wire."""
+
+    nominal_ctwd: Metre = 0.015
+    """The CTWD for which the torch's tip was measured: there the tip of the wire touches the seam."""
+
+    start_trim: Metre = 0.0
+    """Length of seam left out at its start, as travelled."""
+
+    end_trim: Metre = 0.0
+    """Length of seam left out at its end, as travelled."""
+
+    reverse: bool = False
+    """Whether the seam is travelled from its end to its start."""
+
+    roll_free: bool = True
+    """Whether the arm may turn the torch about its wire."""
+
+    def __post_init__(self) -> None:
+        for name in ("step", "speed", "turn_limit", "ctwd", "nominal_ctwd"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} = {getattr(self, name):g} must be positive", key=name, value=getattr(self, name))
+        for name in ("smoothing", "start_trim", "end_trim"):
+            if not getattr(self, name) >= 0:
+                raise ConfigError(f"{name} = {getattr(self, name):g} m must not be negative", key=name, value=getattr(self, name))
+        if self.step < 1e-5:
+            raise ConfigError(f"step = {self.step:g} m; 0.01 mm is the least", key="step", value=self.step)
+        for name in ("work_angle", "travel_angle"):
+            if not abs(getattr(self, name)) <= STEEPEST:
+                raise ConfigError(
+                    f"{name} = {getattr(self, name):.3g} rad leans over 60 deg", key=name, value=getattr(self, name), limit=STEEPEST
+                )

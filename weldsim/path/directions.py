@@ -1,0 +1,74 @@
+"""Directions along a line: made to keep one side, smoothed over arc length, kept from turning too fast."""
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.frames import unit
+from weldsim.quantity import Metre, Radian, RadianPerMetre
+
+
+def one_sided(directions: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
+    """The directions without flips: each on the side of the one before it, all on the side most of them were on."""
+    same = np.einsum("ij,ij->i", directions[1:], directions[:-1]) >= 0
+    sign = np.cumprod(np.concatenate([[1.0], np.where(same, 1.0, -1.0)]))
+    return directions * (sign * (1.0 if sign.sum() >= 0 else -1.0))[:, None]
+
+
+def smooth(s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], length: Metre) -> Float[ndarray, "n 3"]:
+    """Unit directions by local linear regression over arc length `s` [m], Gaussian weights of standard deviation `length`.
+
+    A local line, unlike a local mean, has no bias where the direction turns steadily, at the ends least of all
+    (Fan and Gijbels, Local Polynomial Modelling, 1996, section 3.2.5).
+    """
+    if length <= 0 or len(s) < 3:
+        return unit(directions)
+    # Nodes count by the length they stand for, so dense stretches do not outweigh sparse ones.
+    share = np.gradient(s)
+    out = np.empty_like(directions)
+    for i, at in enumerate(s):
+        low, high = np.searchsorted(s, [at - 4 * length, at + 4 * length])
+        d = s[low:high] - at
+        w = share[low:high] * np.exp(-0.5 * (d / length) ** 2)
+        m0, m1, m2 = w.sum(), w @ d, w @ (d * d)
+        spread = m0 * m2 - m1 * m1
+        kernel = w * (m2 - m1 * d) / spread if spread > 1e-12 * m0 * m0 * length * length else w / m0
+        out[i] = kernel @ directions[low:high]
+    return unit(out)
+
+
+def turn(directions: Float[ndarray, "n 3"]) -> Float[ndarray, "n-1"]:
+    """Angle from each direction to the next [rad]."""
+    a, b = directions[:-1], directions[1:]
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+
+
+def limited(s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], rate: RadianPerMetre) -> Float[ndarray, "n 3"]:
+    """Unit directions that turn by at most `rate` [rad/m] of arc length, as given wherever they already do.
+
+    A limiter run forwards lags, one run backwards leads: their middle does neither. The last pass makes good what the
+    middle of two directions on a sphere may exceed.
+    """
+    steps = rate * np.diff(s)
+    if (turn(directions) <= steps).all():
+        return directions
+    forwards = _chase(directions, steps)
+    backwards = _chase(directions[::-1], steps[::-1])[::-1]
+    return _chase(unit(forwards + backwards), steps)
+
+
+def _chase(directions: Float[ndarray, "n 3"], steps: Float[ndarray, "n-1"]) -> Float[ndarray, "n 3"]:
+    """Each direction turned from the one before it towards its own, by at most its step [rad]."""
+    out = np.array(directions)
+    for i, step in enumerate(steps):
+        out[i + 1] = _towards(out[i], directions[i + 1], float(step))
+    return out
+
+
+def _towards(a: Float[ndarray, "3"], b: Float[ndarray, "3"], most: Radian) -> Float[ndarray, "3"]:
+    """`b`, or where it is further than `most` [rad] from `a`, the direction that far from `a` on the way to it."""
+    aside = b - (a @ b) * a
+    length = float(np.linalg.norm(aside))
+    if np.arctan2(length, a @ b) <= most or length < 1e-12:
+        return b if a @ b > 0 else a
+    return np.cos(most) * a + np.sin(most) * aside / length

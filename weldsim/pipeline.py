@@ -1,0 +1,222 @@
+"""The whole job, in order: scene -> sensor -> cloud -> seam -> path -> motion -> execution -> report.
+
+`plan` is the middle of it, for any cloud; `run` is all of it on the twin. Perception sees what the sensor delivers and
+nothing else: the known seam is handed to the report alone. Times are taken here and nowhere else.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
+
+from weldsim.cloud.deproject import deproject
+from weldsim.cloud.files import check_plannable
+from weldsim.cloud.filters import prepare
+from weldsim.cloud.merge import merge
+from weldsim.config import CellConfig, digest
+from weldsim.curves import project
+from weldsim.errors import InputError
+from weldsim.path.plan import plan_path
+from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
+from weldsim.report.weld import weld_report
+from weldsim.seam.find import find_seams
+
+if TYPE_CHECKING:
+    from weldsim.execution.simulated import FrameCallback
+    from weldsim.motion.plan import MotionPlan
+    from weldsim.scene.config import SceneConfig
+    from weldsim.scene.world import World
+    from weldsim.sensor.base import Capture
+
+SensorName = Literal["d415", "exact"]
+Tell = Callable[[str, float | None], None]
+"""Told the stage that begins, and while it runs the fraction done, 0 to 1, where that is known."""
+
+
+@dataclass(eq=False)
+class Clock:
+    """Seconds a stage, in order. Attributes: seconds; tell, called when a stage begins."""
+
+    tell: Tell = lambda stage, done: None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Adds the time its block takes to `seconds[name]`."""
+        self.tell(name, None)
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlanResult:
+    """What was planned from a cloud. Attributes: cloud, as the seam finder saw it; findings; paths, one for each seam;
+    timing, seconds a stage; config_digest."""
+
+    cloud: PointCloud
+    findings: SeamFindings
+    paths: tuple[TorchPath, ...]
+    timing: dict[str, float]
+    config_digest: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunResult:
+    """A whole job on the twin. Attributes: world; captures, one a view; plan; welded, the index of the seam that was welded;
+    motion and log, None where there was nothing to weld; report."""
+
+    world: "World"
+    captures: tuple["Capture", ...]
+    plan: PlanResult
+    welded: int
+    motion: "MotionPlan | None"
+    log: ExecutionLog | None
+    report: WeldReport
+
+
+def plan(cloud: PointCloud, config: CellConfig | None = None, *, clock: Clock | None = None) -> PlanResult:
+    """Seams of a cloud in the robot base, best first, and a torch path along each; none of either where there is no seam.
+
+    Raises:
+        CloudError: a cloud that cannot show a seam.  PathError: the path asked for does not fit a seam.
+    """
+    config, clock = config or CellConfig(), clock or Clock()
+    with clock.stage("cloud"):
+        cloud = prepare(cloud, config.cloud)
+        check_plannable(cloud)
+    with clock.stage("seam"):
+        findings = find_seams(cloud, config.seam)
+    with clock.stage("path"):
+        paths = tuple(plan_path(seam, config.path) for seam in findings.seams)
+    return PlanResult(cloud=cloud, findings=findings, paths=paths, timing=clock.seconds, config_digest=digest(config))
+
+
+def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float] | None = None) -> int:
+    """Index of the seam that is meant: the best one, or the `number`-th from 1, or the one nearest to a point in B [m].
+
+    Raises:
+        InputError: a number that no seam has.
+    """
+    count = len(findings.seams)
+    if near is not None and count:
+        distances = [project(np.array([near], float), seam.points_B)[0][0] for seam in findings.seams]
+        return int(np.argmin(distances))
+    if number is None:
+        return 0
+    if not 1 <= number <= count:
+        raise InputError(f"seam {number}: {count} found, numbered from 1", seam=number, found=count)
+    return number - 1
+
+
+def scan(world: "World", config: CellConfig, seed: int = 0, sensor: SensorName = "d415") -> tuple["Capture", ...]:
+    """One exposure from each view of the scene, the arm standing where it holds the camera.
+
+    Raises:
+        UnreachableError: a view that the arm cannot take.  SensorError: nothing draws here.
+    """
+    from weldsim.sensor.base import View
+    from weldsim.sensor.exact import ExactSensor, twin_scene
+    from weldsim.sensor.stereo import D415Fast
+
+    captures = []
+    for index, X_BC in enumerate(world.views):
+        exact = ExactSensor(twin_scene(world, world.new_data(world.view_joints(index))), world.intrinsics)
+        camera = D415Fast(exact, config.sensor, seed=seed) if sensor == "d415" else exact
+        try:
+            captures.append(camera.capture(View(X_BC=X_BC)))
+        finally:
+            exact.close()
+    return tuple(captures)
+
+
+def run(
+    scene: "SceneConfig",
+    config: CellConfig | None = None,
+    *,
+    seed: int = 0,
+    sensor: SensorName = "d415",
+    number: int | None = None,
+    near: Sequence[float] | None = None,
+    on_frame: "FrameCallback | None" = None,
+    tell: Tell | None = None,
+) -> RunResult:
+    """The twin scans the scene, plans and welds what it found, and is judged against the scene's known seams.
+
+    Args:
+        scene: what stands on the table.  config: everything else.
+        seed: of the camera's noise.  sensor: the D415 model, or exact depth.
+        number, near: which seam to weld; see `pick`.
+        on_frame: called with the robot every `config.execution.simulation.frame_period`, to film it.
+        tell: told of progress.
+    Raises:
+        WeldsimError: see the stages; finding no seam is a result, not an error.
+    """
+    from weldsim.scene.world import build_world
+
+    config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
+    with clock.stage("scene"):
+        world = build_world(scene)
+    with clock.stage("sensor"):
+        captures = scan(world, config, seed, sensor)
+    with clock.stage("cloud"):
+        cloud = merge([deproject(capture.frame) for capture in captures])
+    result = plan(cloud, config, clock=clock)
+    welded = pick(result.findings, number, near) if result.paths else 0
+    motion, log = _weld(world, result.paths[welded], config, clock, on_frame) if result.paths else (None, None)
+    with clock.stage("report"):
+        report = weld_report(
+            result.findings,
+            result.paths,
+            scene=scene.name,
+            log=log,
+            known=world.known_seams,
+            true_region=_true_region(captures, cloud, result.cloud),
+            welded=welded,
+            seed=seed,
+            config_digest=result.config_digest,
+            config=config.report,
+        )
+    report = replace(report, timing=dict(clock.seconds))
+    return RunResult(world=world, captures=captures, plan=result, welded=welded, motion=motion, log=log, report=report)
+
+
+def _weld(
+    world: "World", path: TorchPath, config: CellConfig, clock: Clock, on_frame: "FrameCallback | None"
+) -> tuple["MotionPlan", ExecutionLog]:
+    """The motion from the last scan view along the path, and what the simulated arm did of it."""
+    from weldsim.execution.runner import execute
+    from weldsim.execution.simulated import SimulatedRobot
+    from weldsim.motion.collision import CellCollision
+    from weldsim.motion.plan import plan_motion
+
+    q_start = world.view_joints(len(world.views) - 1)
+    with clock.stage("motion"):
+        motion = plan_motion(path, q_start, config.motion, blocked=CellCollision(world.model))
+    with clock.stage("execution"), SimulatedRobot(world.model, q_start, config.execution.simulation, on_frame) as robot:
+        log = execute(robot, motion.trajectory, config.execution, lambda done: clock.tell("execution", done))
+    return motion, log
+
+
+def _true_region(captures: tuple["Capture", ...], cloud: PointCloud, kept: PointCloud) -> Bool[ndarray, "n"] | None:
+    """For each point kept, whether it lies in a groove; None where points were merged and cannot be told apart."""
+    from weldsim.sensor.base import Label
+
+    masks = []
+    for capture in captures:
+        if capture.truth is None:
+            return None
+        masks.append(capture.truth.labels.reshape(-1) == Label.GROOVE)
+    if len(captures) == 1:
+        return None if kept.pixel is None else masks[0][kept.pixel]
+    if len(kept) != len(cloud):
+        return None
+    seen = [np.isfinite(capture.frame.depth.reshape(-1)) for capture in captures]
+    return np.concatenate([mask[returns] for mask, returns in zip(masks, seen, strict=True)])
