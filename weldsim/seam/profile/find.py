@@ -19,7 +19,7 @@ from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.judge import confidence, refusal
 from weldsim.seam.profile.rail import lay_out
-from weldsim.seam.profile.refine import Fit, refine
+from weldsim.seam.profile.refine import Fit, pieces, refine
 from weldsim.seam.profile.valley import trace_valleys, valley_image
 
 MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
@@ -38,8 +38,6 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     threshold = Threshold(name="valley depth along 25 mm", value=valleys.threshold, unit="m", noise=valleys.noise)
     accepted: list[tuple[Fit, tuple[float, float], float]] = []
     rejected: list[Rejection] = []
-    normal = -chart.axes[2]
-    origins = cloud.sight_origins()
     for coarse in trace_valleys(chart, valleys, config):
         line = coarse.points
         if coarse.level < MIN_LEVEL:
@@ -47,8 +45,7 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
             continue
         if any(_covers(fit, line) for fit, _, _ in accepted):
             continue
-        picked = _surroundings(chart, line, int(config.points_per_metre * (arc_length(line)[-1] + 2 * SURROUNDINGS)))
-        fit = refine(line, normal, cloud.points[picked], None if origins is None else origins[picked], config)
+        fit = _refine_whole(chart, line, cloud, config)
         if fit is None:
             rejected.append(_rejection(line, "no parent surface on both sides at one level"))
             continue
@@ -64,6 +61,24 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
         _mark_region(region, number, cloud, chart, fit, span)
     seams = tuple(_seam(fit, span, sure) for fit, span, sure in accepted)
     return SeamFindings(seams=seams, region=region, rejected=tuple(rejected), threshold=threshold, method="profile")
+
+
+def _refine_whole(chart: Chart, line: Float[ndarray, "k 3"], cloud: PointCloud, config: ProfileConfig) -> Fit | None:
+    """The fit of a coarse line; begun again, with the points around, where the groove goes on far beyond the line."""
+    origins, fit = cloud.sight_origins(), None
+    for _ in range(3):
+        most = int(config.points_per_metre * (arc_length(line)[-1] + 2 * SURROUNDINGS))
+        picked = _surroundings(chart, line, most)
+        fit = refine(line, -chart.axes[2], cloud.points[picked], None if origins is None else origins[picked], config)
+        if fit is None:
+            return None
+        core = pieces(fit.track.weight > 0, fit.rail.step)[0]
+        found = fit.rail.points[core]
+        beyond = max(np.linalg.norm(line - end, axis=1).min() for end in (found[0], found[-1]))
+        if beyond < 0.5 * SURROUNDINGS:
+            break
+        line = found
+    return fit
 
 
 def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:

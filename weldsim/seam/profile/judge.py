@@ -8,13 +8,15 @@ from weldsim.seam.profile.refine import Fit
 
 MISFIT_LIMIT = 0.75
 MIN_SUPPORT = 0.5
+MIN_STANDING = 9.0
+NOISE_REACH = 0.007  # [m] over which a stereo camera's noise is shared
 
 
 def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> str | None:
     """Why the candidate is no groove, one clause, or None if it is one."""
     section, length = fit.section, span[1] - span[0]
     support = supported(fit, span, config)
-    contrast = _contrast(fit)
+    contrast, standing = _contrast(fit), _standing(fit, length)
     checks = [
         (length < config.min_length, f"{length * 1e3:.1f} mm long, under {config.min_length * 1e3:.0f} mm"),
         (section.width < config.min_width, f"opening {section.width * 1e3:.1f} mm, under {config.min_width * 1e3:.1f} mm"),
@@ -23,6 +25,7 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> str |
         (_shown_depth(fit) < config.min_depth, f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {config.min_depth * 1e3:.2f} mm"),
         (fit.track.misfit > MISFIT_LIMIT, f"cross-sections fit a groove poorly ({fit.track.misfit:.2f}, limit {MISFIT_LIMIT})"),
         (contrast < 4.0, f"depth is {contrast:.1f} times its own scatter, under 4"),
+        (standing < MIN_STANDING, f"depth and length stand {standing:.1f} times over the noise, under {MIN_STANDING:g}"),
         (support < MIN_SUPPORT, f"parent surface on both sides over {support:.0%} of it, under {MIN_SUPPORT:.0%}"),
         (_floor_goes_on(fit, span), "its floor goes on as the surface around it: a gap between two objects on a plate"),
     ]
@@ -39,6 +42,14 @@ def confidence(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> fl
 def _shown_depth(fit: Fit) -> float:
     """Greatest depth of the blurred section [m]."""
     return float(np.max(fit.section.depth_at(fit.grid.x, np.full_like(fit.grid.x, float(np.median(fit.grid.shear))))))
+
+
+def _standing(fit: Fit, length: float) -> float:
+    """Depth over the parent surface's noise, times the root of how many independent looks the length affords.
+
+    Correlated noise now and then draws a short shallow furrow; a groove is deeper or longer.
+    """
+    return _shown_depth(fit) / max(fit.parent.noise, 1e-6) * float(np.sqrt(max(length, 0.0) / NOISE_REACH))
 
 
 def _contrast(fit: Fit) -> float:

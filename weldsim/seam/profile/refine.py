@@ -232,7 +232,9 @@ def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Boo
     model = section.depth_at(x, shear)
     delta = 1e-4
     slope = (section.depth_at(x - delta, shear) - section.depth_at(x + delta, shear)) / (2 * delta)
-    known = np.isfinite(grid.depth)
+    # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
+    with np.errstate(invalid="ignore"):
+        known = (grid.depth < 1.5 * section.depth + 0.002) & (grid.depth > -0.004)
     # Inside the groove a stereo camera is about twice as noisy as on the plate.
     weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
     depth = np.where(known, grid.depth, 0.0)
