@@ -126,7 +126,7 @@ def _cell_size(uv: Float[ndarray, "n 2"], scale: float) -> float:
     coarse = max(float(extent.max()) / 128, 1e-12)
     occupied = len(np.unique(np.floor((uv - low) / coarse).astype(np.int64) @ np.array([1, 100_003])))
     spacing = np.sqrt(occupied * coarse**2 / len(uv))
-    step = max(COARSE_PITCH / scale, 1.1 * spacing)
+    step = max(COARSE_PITCH / scale, 1.5 * spacing)
     return float(max(step, np.sqrt(np.prod(extent + 4 * step) / MAX_CELLS)))
 
 

@@ -204,11 +204,12 @@ def _side_difference(
 def _support(
     s: Float[ndarray, "k"], x: Float[ndarray, "k"], good: Bool[ndarray, "k"], m: int, step: float, band: float
 ) -> Float[ndarray, "m 2"]:
-    """Fraction of each side's cells, within 3 mm along the seam, that hold parent surface."""
+    """Share of each side's cells, within 3 mm along the seam, that hold parent surface; 1 where as many do as usual."""
     stations = np.clip((s / step).astype(int), 0, m - 1)
     out = np.zeros((m, 2))
     kernel = np.ones(max(1, round(0.006 / step)))
     full = band / CELL * (len(kernel) * step / CELL)
     for k, side in enumerate((good & (x > 0), good & (x < 0))):
         out[:, k] = np.convolve(np.bincount(stations[side], minlength=m), kernel, mode="same") / full
-    return np.minimum(out, 1.0)
+    usual = float(np.quantile(out, 0.8))
+    return np.minimum(out / min(max(usual, 0.1), 1.0), 1.0)

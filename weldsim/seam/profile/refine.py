@@ -17,7 +17,8 @@ from weldsim.seam.profile.smooth import choose_strength, deviation, smooth
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
 BLOCK = 8  # stations averaged together for the cross-section fit
 LOOK = 0.25  # how much of an independent look one cell of such a block is worth: noise is shared over about 3.5 mm
-TURNS = 3
+MOST_TURNS = 6
+SETTLED = 2e-4  # [m] a rail that moves less than this is done
 LATERAL_REACH = 3  # stations on either side that share a look at the lateral position: as far as noise is correlated
 AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
@@ -94,25 +95,27 @@ def refine(
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
     points, origins = every, every_origin
-    fit, doubt = None, 0.0
-    for turn in range(TURNS):
+    fit, doubt, reach = None, 0.0, 0
+    for turn in range(MOST_TURNS):
         strip = lay_out(rail, points, origins)
         inner = 0.5 * section.width + 0.7 * section.blur + 0.001
         parent = fit_parent(rail, strip, inner, inner + config.side_band)
         grid = make_grid(rail, strip, parent, 0.5 * section.width + section.blur + 0.006)
         flanked = sided(parent, config)
-        if turn < TURNS - 1:
-            section, doubt = _fit_grid(grid, flanked, parent.noise, section)
-            section = replace(section, middle=0.0)
+        section, doubt = _fit_grid(grid, flanked, parent.noise, section)
+        section = replace(section, middle=0.0)
         track = _follow(grid, section, flanked, attached(parent))
         seen = track.weight > 0
         if np.count_nonzero(seen) < 12:
             return None
         offset, sigma = _smoothed(rail, track)
         sigma = np.sqrt(sigma**2 + parent.sigma**2 + doubt**2)
+        settled = turn > 0 and float(np.abs(offset[seen]).max()) < SETTLED and _reach(seen) <= reach + 2
         fit = Fit(rail, parent, grid, section, track, inner, sigma)
-        if turn < TURNS - 1:
-            rail = _advance(rail, parent, section, offset, seen)
+        if settled:
+            break
+        reach = _reach(seen)
+        rail = _advance(rail, parent, section, offset, seen)
     assert fit is not None
     settled = shift_rail(
         fit.rail, offset, _opening_height(fit.parent, fit.section, offset), _slope(fit.parent, offset), respace=False
@@ -171,9 +174,11 @@ def pieces(seen: Bool[ndarray, "m"], step: float, bridge: float = 0.010) -> list
     return [slice(a, b) for a, b in sorted(joined, key=lambda run: run[0] - run[1])]
 
 
-def _first_section(grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
+def _first_section(
+    grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]
+) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
     """A first guess: each station's centroid, smoothed, and the mean profile's width and depth."""
-    filled = np.where(np.isfinite(grid.depth), np.maximum(grid.depth, 0.0), 0.0)
+    filled = np.maximum(_bridged(grid), 0.0)
     kernel = np.ones(9) / 9
     smoothed = np.apply_along_axis(lambda column: np.convolve(column, kernel, mode="same"), 0, filled)
     middle = np.abs(grid.x) < 0.016
@@ -182,6 +187,8 @@ def _first_section(grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, 
     depth = float(np.median(smoothed[flanked], axis=0)[middle].max(initial=0.0))
     if depth <= 0:
         return None
+    filled = np.minimum(filled, 2.5 * depth)
+    smoothed = np.minimum(smoothed, 2.5 * depth)
     window = smoothed * middle * (smoothed > 0.35 * depth)
     mass = window.sum(axis=1)
     groove = mass > 0.3 * np.median(mass[flanked])
@@ -191,11 +198,21 @@ def _first_section(grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, 
     centroid = np.where(seen, (window @ grid.x) / np.maximum(mass, 1e-12), 0.0)
     offset = smooth(centroid[:, None], seen.astype(float), 1e4)[:, 0]
     shifted = np.stack([np.interp(grid.x, grid.x - o, row) for o, row in zip(offset[seen], filled[seen], strict=True)])
-    mean = shifted.mean(axis=0)
+    mean = np.median(np.apply_along_axis(lambda column: np.convolve(column, kernel, mode="same"), 0, shifted), axis=0)
     depth = max(float(mean[middle].max()), 1e-4)
     width = float(np.count_nonzero(mean[middle] > 0.5 * depth) * (grid.x[1] - grid.x[0]))
     section = Section(middle=0.0, width=1.4 * width, depth=1.15 * depth, floor=0.1, lean=0.0, blur=0.003)
     return section, offset, seen
+
+
+def _bridged(grid: Grid) -> Float[ndarray, "m w"]:
+    """The grid's depths with empty cells filled along each row from their neighbours, empty rows 0."""
+    out = np.zeros_like(grid.depth)
+    for row, values in enumerate(grid.depth):
+        known = np.isfinite(values)
+        if known.any():
+            out[row] = np.interp(grid.x, grid.x[known], values[known])
+    return out
 
 
 def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section) -> tuple[Section, float]:
@@ -267,6 +284,12 @@ def _amplitude(each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked:
         if len(core) < 12 or core.std() < 0.22:
             break
     return amplitude
+
+
+def _reach(seen: Bool[ndarray, "m"]) -> int:
+    """Stations in the longest piece."""
+    core = pieces(seen, 1.0, bridge=10.0)[0]
+    return core.stop - core.start
 
 
 def _between(seen: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:

@@ -27,7 +27,7 @@ class ValleyImage:
     depth: (h, w) how far the closed surface lies above the measured one [m], 0 where not valid.
     lined: (h, w) the same averaged along the best of twelve short straight lines through each cell [m].
     lid: (h, w) the closed surface [m, chart height]: the parent surface across a groove.
-    threshold: depth that counts as valley [m].
+    threshold: `lined` that counts as valley [m].  low: down to which a valley already found goes on [m].
     noise: robust standard deviation of `lined` over the chart [m].
     """
 
@@ -35,6 +35,7 @@ class ValleyImage:
     lined: Float[ndarray, "h w"]
     lid: Float[ndarray, "h w"]
     threshold: float
+    low: float
     noise: float
 
 
@@ -61,20 +62,24 @@ def valley_image(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> Va
     middle = float(np.median(background))
     noise = 1.4826 * float(np.median(np.abs(background - middle)))
     threshold = max(middle + config.detection_factor * noise, config.min_depth) * factor
-    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + plane, threshold, noise)
+    low = max(middle + 0.55 * config.detection_factor * noise, 0.5 * config.min_depth) * factor
+    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + plane, threshold, low, noise)
 
 
 def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], length: float) -> Float[ndarray, "h w"]:
     """Greatest mean of `depth` over straight lines of `length` cells through each cell: noise fades, grooves stay."""
     half = max(2, round(length / 2))
     best = np.zeros_like(depth, dtype=np.float32)
-    image = depth.astype(np.float32)
+    image, known = depth.astype(np.float32), valid.astype(np.float32)
     for angle in np.arange(12) * np.pi / 12:
-        kernel = np.zeros((2 * half + 1, 2 * half + 1), np.uint8)
+        kernel: ndarray = np.zeros((2 * half + 1, 2 * half + 1), np.uint8)
         reach = np.array([np.cos(angle), np.sin(angle)]) * half
         ends = np.rint(half + np.array([-reach, reach])).astype(int)
         cv2.line(kernel, (int(ends[0, 0]), int(ends[0, 1])), (int(ends[1, 0]), int(ends[1, 1])), 1)
-        best = np.maximum(best, cv2.filter2D(image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_CONSTANT))
+        kernel = kernel / kernel.sum(dtype=float)
+        share = cv2.filter2D(known, -1, kernel, borderType=cv2.BORDER_CONSTANT)
+        mean = cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_CONSTANT) / np.maximum(share, 0.6)
+        best = np.maximum(best, mean)
     return np.where(valid, best, 0.0).astype(float)
 
 
@@ -118,7 +123,7 @@ class CoarseLine:
 def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
     """Coarse centre lines, one for each elongated valley, the strongest first."""
     seeds = valleys.lined > valleys.threshold
-    extent = (valleys.depth > 0.4 * np.maximum(valleys.lined, valleys.threshold)).astype(np.uint8)
+    extent = ((valleys.lined > valleys.low) & (valleys.depth > 0.4 * valleys.lined)).astype(np.uint8)
     if config.min_width / chart.pitch >= 3:  # cell-wide threads run along the steps of outer edges
         extent = cv2.morphologyEx(extent, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     number, labels, stats, _ = cv2.connectedComponentsWithStats(extent, connectivity=8)
