@@ -6,7 +6,7 @@ nothing else: the known seam is handed to the report alone. Times are taken here
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -27,7 +27,8 @@ from weldsim.report.weld import weld_report
 from weldsim.seam.find import find_seams
 
 if TYPE_CHECKING:
-    from weldsim.execution.simulated import FrameCallback
+    from pathlib import Path
+
     from weldsim.motion.plan import MotionPlan
     from weldsim.scene.config import SceneConfig
     from weldsim.scene.world import World
@@ -145,7 +146,7 @@ def run(
     sensor: SensorName = "d415",
     number: int | None = None,
     near: Sequence[float] | None = None,
-    on_frame: "FrameCallback | None" = None,
+    video: "Path | None" = None,
     tell: Tell | None = None,
 ) -> RunResult:
     """The twin scans the scene, plans and welds what it found, and is judged against the scene's known seams.
@@ -154,7 +155,7 @@ def run(
         scene: what stands on the table.  config: everything else.
         seed: of the camera's noise.  sensor: the D415 model, or exact depth.
         number, near: which seam to weld; see `pick`.
-        on_frame: called with the robot every `config.execution.simulation.frame_period`, to film it.
+        video: where to write a film of the weld.
         tell: told of progress.
     Raises:
         WeldsimError: see the stages; finding no seam is a result, not an error.
@@ -170,7 +171,7 @@ def run(
         cloud = merge([deproject(capture.frame) for capture in captures])
     result = plan(cloud, config, clock=clock)
     welded = pick(result.findings, number, near) if result.paths else 0
-    motion, log = _weld(world, result.paths[welded], config, clock, on_frame) if result.paths else (None, None)
+    motion, log = _weld(world, result.paths[welded], config, clock, video) if result.paths else (None, None)
     with clock.stage("report"):
         report = weld_report(
             result.findings,
@@ -189,18 +190,24 @@ def run(
 
 
 def _weld(
-    world: "World", path: TorchPath, config: CellConfig, clock: Clock, on_frame: "FrameCallback | None"
+    world: "World", path: TorchPath, config: CellConfig, clock: Clock, video: "Path | None"
 ) -> tuple["MotionPlan", ExecutionLog]:
     """The motion from the last scan view along the path, and what the simulated arm did of it."""
     from weldsim.execution.runner import execute
     from weldsim.execution.simulated import SimulatedRobot
+    from weldsim.execution.video import WeldVideo
     from weldsim.motion.collision import CellCollision
     from weldsim.motion.plan import plan_motion
 
     q_start = world.view_joints(len(world.views) - 1)
     with clock.stage("motion"):
         motion = plan_motion(path, q_start, config.motion, blocked=CellCollision(world.model))
-    with clock.stage("execution"), SimulatedRobot(world.model, q_start, config.execution.simulation, on_frame) as robot:
+    with clock.stage("execution"), ExitStack() as stack:
+        film, simulation = None, config.execution.simulation
+        if video is not None:
+            film = stack.enter_context(WeldVideo(video))
+            simulation = replace(simulation, frame_period=film.frame_period)
+        robot = stack.enter_context(SimulatedRobot(world.model, q_start, simulation, film))
         log = execute(robot, motion.trajectory, config.execution, lambda done: clock.tell("execution", done))
     return motion, log
 

@@ -33,6 +33,8 @@ def path_document(
     timing: dict[str, float],
     source: dict[str, Any],
     config_digest: str,
+    *,
+    numbers: tuple[int, ...] | None = None,
 ) -> dict[str, Any]:
     """The `weldsim.path/1` document of seams and the torch paths along them, as plain lists and numbers.
 
@@ -41,16 +43,18 @@ def path_document(
         timing: seconds a stage, kept under the one key `timing`.
         source: what was planned from (file name, points, viewpoint); kept under `input`.
         config_digest: of the resolved config.
+        numbers: of the seams among all that were found; 1, 2, ... by default.
     Raises:
         InputError: seams and paths that do not pair up.
     """
     if len(seams) != len(paths):
         raise InputError(f"path document: {len(seams)} seams and {len(paths)} torch paths; each seam needs one", seams=len(seams))
+    named = numbers or range(1, len(seams) + 1)
     return {
         "schema": SCHEMA,
         "frame": "base",
         "units": {"length": "m", "angle": "rad"},
-        "seams": [_seam_entry(i + 1, seam, path) for i, (seam, path) in enumerate(zip(seams, paths, strict=True))],
+        "seams": [_seam_entry(*entry) for entry in zip(named, seams, paths, strict=True)],
         "timing": {stage: round(float(seconds), 6) for stage, seconds in timing.items()},
         "input": source,
         "config_digest": config_digest,

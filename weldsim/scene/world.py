@@ -17,6 +17,7 @@ from weldsim.scene.cell import new_cell
 from weldsim.scene.config import SceneConfig, make_workpiece, part_pose
 from weldsim.scene.fixture import add_clamps, add_wedge
 from weldsim.scene.mesh_cache import cached_mesh
+from weldsim.scene.quiet import keep_quiet
 from weldsim.scene.shapes import Group, box, mesh_geom
 from weldsim.scene.tool import add_tool
 from weldsim.scene.workpieces.base import Workpiece
@@ -120,6 +121,7 @@ def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480
     """
     if not config.views:
         raise SceneError(f"scene {config.name!r}: no scan view; give one at least", scene=config.name, key="views")
+    keep_quiet()
     workpiece = make_workpiece(config)
     X_BP = part_pose(config.pose, workpiece)
     spec = new_cell(config.material)

@@ -1,0 +1,68 @@
+"""The command `weldsim`: what every subcommand shares. Answers go to stdout, everything else to stderr in one line.
+
+Exit codes: 0 done, 1 a job that cannot succeed or a failed verdict, 2 bad input, 70 a defect of weldsim itself (with
+WELDSIM_DEBUG=1 its traceback is shown), 130 interrupted, 141 the reader of stdout went away.
+"""
+
+import json
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+
+from weldsim import __version__
+from weldsim.errors import WeldsimError
+
+DEFECT, INTERRUPTED, NO_READER = 70, 130, 141  # sysexits.h EX_SOFTWARE; 128 + SIGINT; 128 + SIGPIPE
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """The exit code of one command; `args` without the program's name, or what the process was started with."""
+    words = list(sys.argv[1:] if args is None else args)
+    debug = os.environ.get("WELDSIM_DEBUG", "") not in ("", "0")
+    try:
+        with warnings.catch_warnings():
+            if not debug:
+                warnings.simplefilter("ignore")  # of libraries; they mean nothing to who runs a command
+            code = _dispatch(words)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Python flushes stdout once more as it ends: into nothing, then.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return NO_READER
+    except KeyboardInterrupt:
+        return _fail("interrupted", INTERRUPTED, as_json=False)
+    except WeldsimError as error:
+        return _fail(str(error), error.exit_code, as_json="--json" in words)
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        return _fail(
+            f"internal error: {what}; this is a defect of weldsim, WELDSIM_DEBUG=1 shows where", DEFECT, as_json="--json" in words
+        )
+    return code
+
+
+def _dispatch(words: list[str]) -> int:
+    """Runs the command that `words` name."""
+    if words == ["--version"]:
+        print(f"weldsim {__version__}")
+        return 0
+    # tyro takes a sixth of a second: not for --version, and not for who only imports this package.
+    from weldsim.cli.usage import parse
+
+    command = parse(words)
+    return command if isinstance(command, int) else command()
+
+
+def _fail(message: str, code: int, *, as_json: bool) -> int:
+    """`code`, after one line on stderr and, for machines, one object on stdout."""
+    try:
+        if as_json:
+            print(json.dumps({"error": message, "exit_code": code}), flush=True)
+        print(f"weldsim: {message}", file=sys.stderr, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code

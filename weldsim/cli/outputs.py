@@ -1,0 +1,48 @@
+"""Places to write to, tried before the long work."""
+
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from weldsim.errors import InputError, OutputError
+
+
+def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None] = ()) -> None:
+    """Nothing, when every output can be written; nothing is left behind.
+
+    Raises:
+        OutputError: a folder where a file is meant, a folder that is missing or cannot be written.
+        InputError: an output that is given twice or would overwrite an input.
+    """
+    taken = {path.resolve(): "is read by this command" for path in inputs if path is not None}
+    for path in outputs:
+        if path is None:
+            continue
+        place = path.resolve()
+        if place in taken:
+            raise InputError(f"{path}: {taken[place]}; write elsewhere", path=str(path))
+        taken[place] = "is given twice"
+        if path.is_dir():
+            raise OutputError(f"{path}: is a folder; give a file name", path=str(path))
+        check_folder(path.parent, path)
+
+
+def check_folder(folder: Path, path: Path) -> None:
+    """Nothing, when files can be made in `folder`. Raises OutputError about `path`."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, ValueError) as error:
+        reason = "no such folder" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None) or str(error)
+        raise OutputError(f"{path}: cannot be written in {folder} ({reason})", path=str(path)) from None
+
+
+def nearest_folder(path: Path) -> Path:
+    """The closest folder above `path` that exists."""
+    return next(folder for folder in path.resolve().parents if folder.exists())
+
+
+def check_suffix(path: Path | None, allowed: tuple[str, ...], what: str) -> None:
+    """Raises OutputError when `path` does not end as `what` does."""
+    if path is not None and path.suffix.lower() not in allowed:
+        raise OutputError(f"{path}: {what} ends in {' or '.join(allowed)}", path=str(path), allowed=list(allowed))

@@ -1,0 +1,235 @@
+"""`weldsim plan`."""
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import tyro
+
+from weldsim import units
+from weldsim.cli.options import ConfigOptions, Method, refuse_together
+from weldsim.cli.outputs import check_folder, check_outputs, nearest_folder
+from weldsim.cli.show import Tell, progress, table, times
+from weldsim.errors import InputError, NoSeamError
+
+if TYPE_CHECKING:
+    from weldsim.config import CellConfig
+    from weldsim.pipeline import Clock, PlanResult
+    from weldsim.records import PointCloud, SeamFindings
+
+TOLD_REASONS = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan(ConfigOptions):
+    """Find the groove in a scan and plan the torch path along it.
+
+    The cloud is a PLY, PCD, XYZ, NPZ or NPY file in the base of the robot, or with --intrinsics a depth image. Without
+    --out nothing is written and a summary is printed.
+    """
+
+    cloud: tyro.conf.Positional[Path]
+    """File with the cloud, or with a depth image (16-bit PNG, NPY)."""
+
+    viewpoint: tuple[float, float, float] | None = None
+    """Where the camera stood [m]; by default what the file says."""
+
+    units: Literal["m", "cm", "mm", "in"] | None = None
+    """Unit of length of the cloud; metres by default."""
+
+    intrinsics: Path | None = None
+    """Camera of a depth image: JSON, TOML or `key: value` lines."""
+
+    pose: Path | None = None
+    """Pose of that camera in the base, JSON; by default the base is where the camera is."""
+
+    depth_unit: str | None = None
+    """Length of one count of a depth image, "1 mm" by default."""
+
+    method: Method | None = None
+    """Seam finder: ours (the default) or the published one."""
+
+    seam: int | None = None
+    """Which seam, counted from 1, the best one; by default all."""
+
+    near: tuple[float, float, float] | None = None
+    """The seam nearest to this point [m]."""
+
+    out: Path | None = None
+    """Where to write the path as JSON, schema weldsim.path/1."""
+
+    csv: Path | None = None
+    """Where to write the path as CSV with UR poses of the torch tip."""
+
+    report: Path | None = None
+    """Where to write the report: a file ending in .html, its picture beside it, or a folder."""
+
+    def __call__(self) -> int:
+        """0. Raises NoSeamError, after the report where one was asked for."""
+        page, picture = self._report_files()
+        self._check(page, picture)
+        config = self.cell(self.method)
+        with progress() as tell:
+            result, clock = self._plan(config, tell)
+            if page is not None and picture is not None:
+                with clock.stage("stability"):
+                    result = _with_stability(result, config)
+            chosen, numbers = self._chosen(result)
+            if page is not None and picture is not None:
+                self._write_report(page, picture, chosen, clock, config)
+        if not result.findings.seams:
+            raise NoSeamError(
+                f"{self.cloud}: no seam found; {_reasons(result.findings)}",
+                rejected=[asdict(refused) for refused in result.findings.rejected],
+            )
+        document = self._document(chosen, numbers, clock)
+        self._write(document)
+        if self.json:
+            self._print_json(document, result)
+        else:
+            self._print(chosen, numbers, result, clock, page)
+        return 0
+
+    def _check(self, page: Path | None, picture: Path | None) -> None:
+        """Raises InputError where options contradict each other or an output cannot be written."""
+        refuse_together(seam=self.seam, near=self.near)
+        refuse_together(viewpoint=self.viewpoint, intrinsics=self.intrinsics)
+        refuse_together(units=self.units, intrinsics=self.intrinsics)
+        for name in ("pose", "depth_unit"):
+            if getattr(self, name) is not None and self.intrinsics is None:
+                raise InputError(f"--{name.replace('_', '-')}: belongs to a depth image; give its --intrinsics too", option=name)
+        if self.seam is not None and self.seam < 1:
+            raise InputError(f"--seam {self.seam}: seams are counted from 1", seam=self.seam)
+        if page is not None and page.parent == self.report and not page.parent.exists():
+            check_folder(nearest_folder(page), page)
+            page = picture = None  # in a folder still to be made
+        check_outputs((self.out, self.csv, page, picture), (self.cloud, self.intrinsics, self.pose, self.config))
+
+    def _report_files(self) -> tuple[Path | None, Path | None]:
+        """HTML and PNG."""
+        if self.report is None:
+            return None, None
+        if self.report.suffix.lower() in (".html", ".htm"):
+            return self.report, self.report.with_suffix(".png")
+        return self.report / "report.html", self.report / "report.png"
+
+    def _plan(self, config: "CellConfig", tell: Tell) -> "tuple[PlanResult, Clock]":
+        from weldsim import pipeline
+
+        clock = pipeline.Clock(tell)
+        with clock.stage("read"):
+            cloud = self._read()
+        return pipeline.plan(cloud, config, clock=clock), clock
+
+    def _read(self) -> "PointCloud":
+        """The cloud in the file. Raises CloudFileError, CloudError, ConfigError."""
+        from weldsim.cloud.deproject import deproject
+        from weldsim.cloud.files import read_cloud, read_depth_frame
+
+        if self.intrinsics is None:
+            return read_cloud(self.cloud, unit=self.units or "m", viewpoint=self.viewpoint)
+        count = units.parse(self.depth_unit or "1 mm", "m", where="--depth-unit")
+        if not count > 0:
+            raise InputError(f"--depth-unit {self.depth_unit}: must be positive", depth_unit=self.depth_unit)
+        return deproject(read_depth_frame(self.cloud, self.intrinsics, pose=self.pose, depth_unit=count))
+
+    def _chosen(self, result: "PlanResult") -> "tuple[PlanResult, tuple[int, ...]]":
+        """The result with the seams that were asked for alone, and their numbers."""
+        from weldsim.pipeline import pick
+
+        findings = result.findings
+        everything = tuple(range(1, len(findings.seams) + 1))
+        if not everything or (self.seam is None and self.near is None):
+            return result, everything
+        index = pick(findings, self.seam, self.near)
+        region = np.where(findings.region == index + 1, 1, 0)
+        findings = replace(findings, seams=(findings.seams[index],), region=region)
+        return replace(result, findings=findings, paths=(result.paths[index],)), (index + 1,)
+
+    def _document(self, chosen: "PlanResult", numbers: tuple[int, ...], clock: "Clock") -> dict[str, Any]:
+        from weldsim.path.files import path_document
+
+        viewpoints = chosen.cloud.viewpoints.tolist()
+        source = {"file": self.cloud.name, "points": len(chosen.cloud), "viewpoints": viewpoints, "method": chosen.findings.method}
+        return path_document(
+            chosen.findings.seams, chosen.paths, clock.seconds, source, chosen.config_digest, numbers=numbers or None
+        )
+
+    def _write(self, document: dict[str, Any]) -> None:
+        from weldsim.path.files import write_path_csv, write_path_json
+
+        if self.out is not None:
+            write_path_json(self.out, document)
+        if self.csv is not None:
+            write_path_csv(self.csv, document)
+
+    def _write_report(self, page: Path, picture: Path, chosen: "PlanResult", clock: "Clock", config: "CellConfig") -> None:
+        from weldsim.report.html import write_html
+        from weldsim.report.png import write_png
+        from weldsim.report.weld import weld_report
+
+        report = weld_report(
+            chosen.findings,
+            chosen.paths,
+            scene=self.cloud.name,
+            timing=dict(clock.seconds),
+            config_digest=chosen.config_digest,
+            config=config.report,
+        )
+        clock.tell("report", None)
+        page.parent.mkdir(parents=True, exist_ok=True)
+        write_html(page, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+        write_png(picture, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+
+    def _print_json(self, document: dict[str, Any], result: "PlanResult") -> None:
+        from weldsim.path.files import path_text
+
+        threshold = result.findings.threshold
+        more: dict[str, Any] = {"rejected": [asdict(refused) for refused in result.findings.rejected]}
+        if threshold is not None:
+            kept = {factor: move if np.isfinite(move) else None for factor, move in threshold.stability.items()}
+            more["threshold"] = {**asdict(threshold), "stability": kept}
+        print(path_text({**document, **more}), end="")
+
+    def _print(
+        self, chosen: "PlanResult", numbers: tuple[int, ...], result: "PlanResult", clock: "Clock", page: Path | None
+    ) -> None:
+        found, method = len(result.findings.seams), chosen.findings.method
+        print(f"{self.cloud.name}: {len(result.cloud)} points, {found} seam{'' if found == 1 else 's'}, method {method}")
+        rows = []
+        for number, seam, path in zip(numbers, chosen.findings.seams, chosen.paths, strict=True):
+            sigma = "-" if seam.sigma is None else f"{units.to_mm(float(np.median(seam.sigma))):.3f} mm"
+            rows.append(
+                [
+                    str(number),
+                    f"{units.to_mm(seam.length):.1f} mm",
+                    f"{units.to_mm(seam.width):.1f} mm" if seam.width > 0 else "-",
+                    "-" if seam.depth is None else f"{units.to_mm(seam.depth):.1f} mm",
+                    f"{seam.confidence:.2f}" if seam.confidence > 0 else "-",
+                    sigma,
+                    seam.reference,
+                    str(len(path.s)),
+                ]
+            )
+        print(table(rows, ("seam", "length", "width", "depth", "confidence", "sigma", "reference", "poses")))
+        print(times(clock.seconds))
+        for path in (self.out, self.csv, page):
+            if path is not None:
+                print(f"  wrote {path}")
+
+
+def _with_stability(result: "PlanResult", config: "CellConfig") -> "PlanResult":
+    from weldsim.seam.stability import with_stability
+
+    return replace(result, findings=with_stability(result.cloud, result.findings, config.seam))
+
+
+def _reasons(findings: "SeamFindings") -> str:
+    """Why the longest candidates were refused, in one clause each."""
+    refused = sorted(findings.rejected, key=lambda rejection: -rejection.length)
+    if not refused:
+        return "nothing in it looks like a groove"
+    told = "; ".join(f"{units.to_mm(one.length):.0f} mm long: {one.reason}" for one in refused[:TOLD_REASONS])
+    more = len(refused) - TOLD_REASONS
+    return f"refused {told}" + (f"; and {more} more" if more > 0 else "")

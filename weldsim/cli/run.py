@@ -1,0 +1,120 @@
+"""`weldsim run`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import tyro
+
+from weldsim.cli.options import ConfigOptions, Method, refuse_together
+from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
+from weldsim.cli.show import print_json, progress, table, times
+from weldsim.errors import InputError
+
+if TYPE_CHECKING:
+    from weldsim.config import CellConfig
+    from weldsim.records import WeldReport
+
+MARKS = {True: "ok", False: "FAIL", None: ""}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(ConfigOptions):
+    """Scan, plan and weld a workpiece in the twin, and judge the weld against the true seam.
+
+    Writes a run directory and exits 1 when the verdict is FAILED.
+    """
+
+    scene: tyro.conf.Positional[str]
+    """Name of a scene (`weldsim scenes`), or a TOML file."""
+
+    seed: int = 0
+    """Of the camera's noise."""
+
+    sensor: Literal["d415", "exact"] = "d415"
+    """What looks: the model of a D415, or exact depth."""
+
+    method: Method | None = None
+    """Seam finder: ours (the default) or the published one."""
+
+    seam: int | None = None
+    """Which seam to weld, counted from 1, the best one (the default)."""
+
+    near: tuple[float, float, float] | None = None
+    """Weld the seam nearest to this point in the base [m]."""
+
+    video: Path | None = None
+    """Where to write a film of the weld, MP4."""
+
+    out: Path | None = None
+    """The run directory; runs/SCENE-SEED by default."""
+
+    def __call__(self) -> int:
+        """0 where the verdict is passed, else 1."""
+        refuse_together(seam=self.seam, near=self.near)
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: 0 or more is needed", seed=self.seed)
+        if self.seam is not None and self.seam < 1:
+            raise InputError(f"--seam {self.seam}: seams are counted from 1", seam=self.seam)
+        config, scene = self.cell(self.method), self.scene_config()
+        folder = self.out or Path("runs") / f"{scene.name}-{self.seed}"
+        self._check(folder)
+
+        from weldsim.pipeline import run
+        from weldsim.run_folder import check_run_folder, write_run
+
+        check_run_folder(folder)
+        with progress() as tell:
+            result = run(
+                scene,
+                config,
+                seed=self.seed,
+                sensor=self.sensor,
+                number=self.seam,
+                near=self.near,
+                video=self.video,
+                tell=tell,
+            )
+            tell("writing", None)
+            write_run(folder, result, config, scene, self.seed, self.sensor)
+        written = [folder, *([self.video] if self.video is not None and result.log is not None else [])]
+        if self.json:
+            self._print_json(result.report, config, written)
+        else:
+            self._print(
+                result.report, config, len(result.plan.findings.seams), written, result.motion.notes if result.motion else ()
+            )
+        return 0 if result.report.passed else 1
+
+    def scene_config(self) -> Any:
+        """The scene, without a name that could lead out of its folder. Raises SceneError, ConfigError."""
+        scene = self.scene_of(self.scene)
+        if not scene.name or any(mark in scene.name for mark in ("/", "\\", "\0")) or scene.name.startswith("."):
+            raise InputError(f"{self.scene}: name {scene.name!r} cannot name a folder", name=scene.name)
+        return scene
+
+    def _check(self, folder: Path) -> None:
+        """Raises OutputError where something cannot be written."""
+        check_suffix(self.video, (".mp4",), "a film")
+        check_outputs((self.video,), (self.config,))
+        if folder.name in ("", ".", ".."):
+            raise InputError(f"--out {folder}: give the run directory a name of its own", path=str(folder))
+        check_folder(nearest_folder(folder), folder)
+
+    def _print_json(self, report: "WeldReport", config: "CellConfig", written: list[Path]) -> None:
+        from weldsim.report.weld import report_json
+
+        print_json({**report_json(report, config.report), "written": [str(path) for path in written]})
+
+    def _print(self, report: "WeldReport", config: "CellConfig", found: int, written: list[Path], notes: tuple[str, ...]) -> None:
+        from weldsim.report.limits import checks, verdict
+
+        word, why = verdict(report, found, config.report)
+        print(f"{report.scene}, seed {report.seed}, {self.sensor}, method {report.method}: {word}, {why}")
+        rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in checks(report, config.report)]
+        print(table(rows, ("figure", "measured", "limit", "")))
+        for note in notes:
+            print(f"  {note}")
+        print(times(report.timing))
+        for path in written:
+            print(f"  wrote {path}")

@@ -1,0 +1,84 @@
+"""`weldsim scan`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+
+from weldsim.cli.options import ConfigOptions
+from weldsim.cli.outputs import check_outputs, check_suffix
+from weldsim.cli.show import print_json, progress
+from weldsim.errors import InputError
+
+CLOUDS = (".ply", ".npz", ".xyz", ".txt")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scan(ConfigOptions):
+    """Let the twin scan a scene, and write what the camera saw as `weldsim plan` reads it."""
+
+    scene: tyro.conf.Positional[str]
+    """Name of a scene (`weldsim scenes`), or a TOML file."""
+
+    seed: int = 0
+    """Of the camera's noise."""
+
+    sensor: Literal["d415", "exact"] = "d415"
+    """What looks: the model of a D415, or exact depth."""
+
+    out: Path | None = None
+    """Where to write the cloud of all views: PLY, NPZ, XYZ or TXT."""
+
+    depth: Path | None = None
+    """Where to write the depth image (16-bit PNG, or NPY in metres); intrinsics and pose are written beside it."""
+
+    view: int = 1
+    """Which view the depth image is of, counted from 1."""
+
+    def __call__(self) -> int:
+        """0."""
+        from weldsim.cloud.depth_output import depth_file_names
+
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: 0 or more is needed", seed=self.seed)
+        check_suffix(self.out, CLOUDS, "a cloud")
+        files = () if self.depth is None else depth_file_names(self.depth)
+        check_outputs((self.out, *files), (self.config,))
+        config, scene = self.cell(), self.scene_of(self.scene)
+        if not 1 <= self.view <= max(1, len(scene.views)):
+            raise InputError(f"--view {self.view}: scene {scene.name!r} has {len(scene.views)}, counted from 1", view=self.view)
+
+        from weldsim.cloud.deproject import deproject
+        from weldsim.cloud.merge import merge
+        from weldsim.pipeline import scan
+        from weldsim.scene.world import build_world
+
+        with progress() as tell:
+            tell("scene", None)
+            world = build_world(scene)
+            tell("scan", None)
+            captures = scan(world, config, self.seed, self.sensor)
+        cloud = merge([deproject(capture.frame) for capture in captures])
+        self._write(cloud, captures[self.view - 1].frame, config.sensor.depth_unit)
+        written = [str(path) for path in (self.out, *files) if path is not None]
+        if self.json:
+            seen = {"scene": scene.name, "seed": self.seed, "sensor": self.sensor, "views": len(captures), "points": len(cloud)}
+            print_json({**seen, "viewpoints": cloud.viewpoints.tolist(), "written": written})
+            return 0
+        print(f"{scene.name}, seed {self.seed}, {captures[0].frame.source}: {len(cloud)} points from {len(captures)} view(s)")
+        for i, (x, y, z) in enumerate(cloud.viewpoints, start=1):
+            print(f"  view {i} from ({x:.4f}, {y:.4f}, {z:.4f}) m in the base")
+        for name in written:
+            print(f"  wrote {name}")
+        return 0
+
+    def _write(self, cloud: Any, frame: Any, depth_unit: float) -> None:
+        from weldsim.cloud.depth_output import write_depth_frame
+        from weldsim.cloud.files import write_cloud
+
+        if self.out is not None:
+            write_cloud(self.out, cloud)
+        if self.depth is not None:
+            step = depth_unit if self.sensor == "d415" and depth_unit > 0 else 1e-4
+            write_depth_frame(self.depth, frame, depth_unit=step)

@@ -1,0 +1,60 @@
+"""What people see: aligned tables, and progress on stderr when a command takes over a second."""
+
+import json
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+PATIENCE = 1.0  # [s] before progress is shown
+
+Tell = Callable[[str, float | None], None]
+
+
+def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
+    """Rows as text with columns aligned to the left, two spaces apart, indented by two."""
+    lines = [list(head), *map(list, rows)] if head else list(map(list, rows))
+    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))] if lines else []
+    return "\n".join(
+        "  " + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
+    )
+
+
+def times(seconds: dict[str, float]) -> str:
+    """Seconds a stage in one line, with their sum."""
+    stages = ", ".join(f"{stage} {value:.2f}" for stage, value in seconds.items())
+    return f"  seconds: {stages}; {sum(seconds.values()):.2f} in all"
+
+
+def print_json(content: dict[str, Any]) -> None:
+    """One object on stdout."""
+    print(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+@contextmanager
+def progress() -> Iterator[Tell]:
+    """A function to be told stage and fraction done; shown on a terminal once PATIENCE has passed, never elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda stage, done: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        TextColumn("{task.description:<10}"), BarColumn(), TimeElapsedColumn(), console=Console(stderr=True), transient=True
+    )
+    task = bar.add_task("starting", total=None)
+
+    def tell(stage: str, done: float | None) -> None:
+        bar.update(task, description=stage, total=None if done is None else 1.0, completed=done or 0.0)
+
+    timer = threading.Timer(PATIENCE, bar.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield tell
+    finally:
+        timer.cancel()
+        timer.join()
+        bar.stop()

@@ -1,0 +1,138 @@
+"""The folder that a run leaves behind: whole or not at all, and never in place of something else."""
+
+import io
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from weldsim.cloud.depth_output import write_depth_frame
+from weldsim.cloud.files import write_cloud
+from weldsim.config import CellConfig, to_json
+from weldsim.errors import OutputError
+from weldsim.output import write_whole
+from weldsim.path.files import path_document, write_path_csv, write_path_json
+from weldsim.pipeline import RunResult
+from weldsim.records import ExecutionLog
+from weldsim.report.html import write_html
+from weldsim.report.png import write_png
+from weldsim.report.weld import report_json
+
+if TYPE_CHECKING:
+    from weldsim.scene.config import SceneConfig
+
+SCHEMA = "weldsim.run/1"
+MANIFEST = "run.json"
+EXACT_STEP = 1e-4  # [m] of exact depth in a PNG
+
+
+def check_run_folder(folder: Path) -> None:
+    """Nothing, when a run may be written there.
+
+    Raises:
+        OutputError: a file, or a folder that holds something other than a run.
+    """
+    if not os.path.lexists(folder):
+        return
+    if not folder.is_dir() or folder.is_symlink():
+        raise OutputError(f"{folder}: is no folder; give another --out", path=str(folder))
+    if any(folder.iterdir()) and not _is_run(folder):
+        raise OutputError(f"{folder}: holds something other than a run and is left alone; give another --out", path=str(folder))
+
+
+def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: str) -> Path:
+    """The folder, in place of an earlier run's.
+
+    It holds config.json (resolved), path.json, path.csv, cloud.ply, a depth image with intrinsics and pose for each view,
+    report.json, report.html, report.png, log.npz where the arm moved, and run.json, which says what is what.
+
+    Raises:
+        OutputError: it cannot be written; nothing is left then.
+    """
+    check_run_folder(folder)
+    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    try:
+        temporary.mkdir(parents=True)
+        _fill(temporary, result, config, scene, seed, sensor)
+        _put_in_place(temporary, folder)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})", path=str(folder)) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return folder
+
+
+def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: str) -> None:
+    plan, report = result.plan, result.report
+    resolved = {"cell": to_json(config), "scene": to_json(scene), "seed": seed, "sensor": sensor}
+    _write_json(folder / "config.json", resolved)
+    source = {"scene": scene.name, "seed": seed, "sensor": sensor, "points": len(plan.cloud), "method": plan.findings.method}
+    document = path_document(plan.findings.seams, plan.paths, report.timing, source, plan.config_digest)
+    write_path_json(folder / "path.json", document)
+    write_path_csv(folder / "path.csv", document)
+    write_cloud(folder / "cloud.ply", plan.cloud)
+    for index, capture in enumerate(result.captures):
+        name = "depth" if len(result.captures) == 1 else f"depth_{index}"
+        step = config.sensor.depth_unit if sensor == "d415" else EXACT_STEP
+        write_depth_frame(folder / f"{name}.png", capture.frame, depth_unit=step or EXACT_STEP)
+    _write_json(folder / "report.json", report_json(report, config.report))
+    seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": config.report}
+    write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, **seen)
+    write_png(folder / "report.png", report, plan.cloud, plan.findings, plan.paths, **seen)
+    if result.log is not None:
+        write_whole(folder / "log.npz", log_bytes(result.log))
+    manifest = {
+        "schema": SCHEMA,
+        "scene": scene.name,
+        "seed": seed,
+        "sensor": sensor,
+        "method": plan.findings.method,
+        "passed": report.passed,
+        "config_digest": plan.config_digest,
+        "versions": report.versions,
+        "files": sorted(path.name for path in folder.iterdir()),
+    }
+    _write_json(folder / MANIFEST, manifest)
+
+
+def log_bytes(log: ExecutionLog) -> bytes:
+    """The log as an NPZ: its arrays by name, X_BT_act as position and quaternion wxyz, events as lines of text."""
+    arrays: dict[str, Any] = {name: getattr(log, name) for name in ("t", "q_cmd", "q_act", "qd_act", "s_cmd", "arc_on")}
+    if log.torque is not None:
+        arrays["torque"] = log.torque
+    arrays["position_B"], arrays["quaternion_wxyz"] = log.X_BT_act.p, log.X_BT_act.quaternion
+    arrays["segments"] = np.array([segment.value for segment in log.segments])
+    arrays["events"] = np.array([f"{event.t:.3f} s {event.kind}: {event.text}" for event in log.events])
+    arrays["period"], arrays["robot"] = np.array(log.period), np.array(log.robot)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def _put_in_place(new: Path, folder: Path) -> None:
+    """`new` renamed to `folder`; an earlier run there is moved aside first and then removed."""
+    if not folder.exists():
+        os.replace(new, folder)
+        return
+    old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
+    os.replace(folder, old)
+    try:
+        os.replace(new, folder)
+    except OSError:
+        os.replace(old, folder)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _is_run(folder: Path) -> bool:
+    try:
+        return json.loads((folder / MANIFEST).read_text()).get("schema") == SCHEMA
+    except (OSError, ValueError, AttributeError):
+        return False
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    write_whole(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")

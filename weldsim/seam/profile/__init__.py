@@ -1,0 +1,1 @@
+"""The default seam finder: cross-sections fitted along a smooth curve."""
