@@ -47,24 +47,30 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     if np.count_nonzero(near) < 20:
         return None
     column = np.round(x[near] / CELL).astype(int)
-    lines = []
+    ends = []
     for k in np.unique(column):
-        inside = np.sort(s[near][column == k] * way)
-        gaps = np.flatnonzero(np.diff(inside) > 3 * CELL)
-        lines.append((k * CELL, way * (inside[gaps[0]] if len(gaps) else inside[-1]) + way * CELL / 2))
-    across, edge = np.array(lines).T
-    limit = here + way * 0.044
-    if np.mean((edge - limit) * way > -CELL) > 0.3:
+        outward = np.sort(s[near][column == k] * way)[::-1]
+        # The last cell of the body: two more follow it closely, so that a lone cell beyond a gap does not count.
+        body = np.flatnonzero(outward[:-2] - outward[2:] < 3.5 * CELL) if len(outward) > 2 else []
+        if len(body):
+            ends.append((k * CELL, way * (outward[body[0]] + CELL / 2)))
+    if not ends:
         return None
-    if not ((across > 0).sum() >= 3 and (across < 0).sum() >= 3):
+    across, edge = np.array(ends).T
+    if np.mean((here + way * 0.044 - edge) * way < CELL) > 0.3 or (across > 0).sum() < 3 or (across < 0).sum() < 3:
         return None
-    keep = np.ones(len(edge), bool)
-    fit_line = np.polyfit(across, edge, 1)
-    for _ in range(4):
-        off = np.abs(edge - np.polyval(fit_line, across))
-        keep = off <= max(2.5 * float(np.median(off)), 0.0015)
-        fit_line = np.polyfit(across[keep], edge[keep], 1)
-    return float(np.polyval(fit_line, 0.0)) if keep.sum() >= 6 else None
+    slope, level = _median_line(across, edge)
+    off = np.abs(edge - level - slope * across)
+    keep = off <= max(2.5 * float(np.median(off)), 0.0015)
+    return float(np.polyval(np.polyfit(across[keep], edge[keep], 1), 0.0)) if keep.sum() >= 6 else None
+
+
+def _median_line(x: Float[ndarray, "k"], y: Float[ndarray, "k"]) -> tuple[float, float]:
+    """Slope and value at 0 of the line of median slope through pairs of points (Theil-Sen)."""
+    i, j = np.triu_indices(len(x), 1)
+    apart = x[i] != x[j]
+    slope = float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart]))
+    return slope, float(np.median(y - slope * x))
 
 
 def station_mask(fit: Fit, span: tuple[float, float]) -> Bool[ndarray, "m"]:

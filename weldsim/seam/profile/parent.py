@@ -55,6 +55,7 @@ def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float) -> Parent:
     penalty, target = penalty * len(s) / knots, target * len(s) / knots
     stiffness, scale = STIFFNESSES[2], 0.003
     weight = np.ones(len(s))
+    theta, residual = np.zeros(design.shape[1]), h
     for turn in range(8):
         if turn == 4:
             stiffness = _choose_stiffness(design, h, weight, penalty, target, np.floor(s / FOLD).astype(int) % 4)
@@ -156,7 +157,7 @@ def _choose_stiffness(
     for k in range(4):
         rows, w = design[fold == k], weight[fold == k]
         parts.append((rows.T @ (rows * w[:, None]), rows.T @ (w * h[fold == k])))
-    whole, right = sum(part[0] for part in parts), sum(part[1] for part in parts)
+    whole, right = np.sum([part[0] for part in parts], axis=0), np.sum([part[1] for part in parts], axis=0)
     ridge = 1e-9 * (1 + np.trace(whole) / len(whole)) * np.eye(len(whole))
     errors = []
     for stiffness in STIFFNESSES:

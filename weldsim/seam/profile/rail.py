@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from weldsim.curves import arc_length, interpolate, tangents
 from weldsim.frames import unit
@@ -87,7 +87,7 @@ def lay_out(rail: Rail, points: Float[ndarray, "k 3"], origins: Float[ndarray, "
     Args:
         points: (k, 3) [m].  origins: (k, 3) where the camera that saw each point stood, or None.
     """
-    station = cKDTree(rail.points).query(points)[1]
+    station = KDTree(rail.points).query(points)[1]
     offset = points - rail.points[station]
     along = np.einsum("ij,ij->i", offset, rail.t[station])
     # Axes between stations: without this, a curved rail's points jump by curvature * x * half a step.

@@ -234,7 +234,8 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
     rows = np.repeat(keep[:, None], mean.shape[1], axis=1) & (number > 0)
     weight = LOOK * number[rows] / BLOCK
-    return fit_section(x[rows], shear[rows], mean[rows], weight, start, max(noise, 5e-5))
+    block = np.broadcast_to(np.arange(m)[:, None], mean.shape)[rows]
+    return fit_section(x[rows], shear[rows], mean[rows], weight, start, block, max(noise, 5e-5))
 
 
 def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> Track:

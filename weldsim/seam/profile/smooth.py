@@ -13,7 +13,7 @@ from scipy.linalg import solveh_banded
 ORDER = 3
 STRENGTHS = tuple(10.0 ** np.arange(2.0, 8.6, 0.5))  # [stations^6] from a few stations to a parabola
 FLOOR = 3e-5  # weight of a station without data, relative to the mean
-BLOCK = 14  # stations left out together in cross-validation: longer than the noise is correlated
+BLOCK = 36  # stations left out together in cross-validation: well beyond where noise is correlated
 
 
 def _penalty_bands(n: int) -> Float[ndarray, "b n"]:
@@ -62,7 +62,7 @@ def choose_strength(values: Float[ndarray, "n d"], weights: Float[ndarray, "n"])
     mean = table.mean(axis=1)
     best = int(mean.argmin())
     spread = (table - table[best]).std(axis=1) / np.sqrt(max(table.shape[1], 1))
-    allowed = np.nonzero(mean <= mean[best] + 0.5 * spread)[0]
+    allowed = np.nonzero(mean <= mean[best] + spread)[0]
     return float(STRENGTHS[int(allowed.max())])
 
 
@@ -79,12 +79,20 @@ def deviation(residual: Float[ndarray, "n"], weights: Float[ndarray, "n"], stren
     root = np.sqrt(np.where(used, weights, 0.0) / weights[used].mean())
     white = residual * root
     matrix = smooth(np.eye(n), weights, strength)
-    freedom = max(1.0 - float(np.trace(matrix)) / used.sum(), 0.1)
-    reach = min(2 * BLOCK, n - 1)
-    lags = np.array([float(white[: n - k] @ white[k:]) for k in range(reach)]) / (used.sum() * freedom)
-    lags *= 1.0 - np.arange(reach) / reach
+    reach = min(BLOCK, n - 1)
+    lags = np.array([float(white[: n - k] @ white[k:]) for k in range(reach)]) / used.sum()
+    taper = 1.0 - np.arange(reach) / reach
     index = np.abs(np.arange(n)[:, None] - np.arange(n)[None, :])
-    covariance = np.where(index < reach, lags[np.minimum(index, reach - 1)], 0.0)
+    missed = np.diag(used.astype(float)) - matrix * used[:, None]
+    guess = lags * taper
+    for _ in range(3):
+        # What the smoother took away with the noise is given back: residuals of this covariance should look like ours.
+        covariance = np.where(index < reach, guess[np.minimum(index, reach - 1)], 0.0)
+        expected = missed @ covariance @ missed.T
+        near = range(min(8, reach))
+        shown = sum(float(np.trace(expected, offset=k)) for k in near) / used.sum()
+        guess = guess * np.clip(float(lags[: len(near)].sum()) / max(shown, 1e-300), 1.0, 2.0)
+    covariance = np.where(index < reach, guess[np.minimum(index, reach - 1)], 0.0)
     spread = matrix / np.where(root > 0, root, np.inf)[None, :]
     variance = np.einsum("ij,jk,ik->i", spread, covariance, spread)
     return np.sqrt(np.maximum(variance, 0.0))

@@ -137,7 +137,7 @@ def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> 
         mask = labels[window] == label
         if np.count_nonzero(seeds[window] & mask) < 0.25 * minimum:
             continue
-        lines += [line + [x, y] for line in _centre_lines(mask, valleys.depth[window], minimum, config.min_width / chart.pitch)]
+        lines += [np.add(line, (x, y)) for line in _centre_lines(mask, valleys.depth[window], minimum, config.min_width / chart.pitch)]
     out = []
     for line in lines:
         column, row = np.rint(line).astype(int).T
