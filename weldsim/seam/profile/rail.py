@@ -87,7 +87,7 @@ def lay_out(rail: Rail, points: Float[ndarray, "k 3"], origins: Float[ndarray, "
     Args:
         points: (k, 3) [m].  origins: (k, 3) where the camera that saw each point stood, or None.
     """
-    station = KDTree(rail.points).query(points)[1]
+    station = _nearest(rail, points)
     offset = points - rail.points[station]
     along = np.einsum("ij,ij->i", offset, rail.t[station])
     # Axes between stations: without this, a curved rail's points jump by curvature * x * half a step.
@@ -106,3 +106,29 @@ def lay_out(rail: Rail, points: Float[ndarray, "k 3"], origins: Float[ndarray, "
     slope = np.stack([np.einsum("ij,ij->i", sight, rail.t[station]), np.einsum("ij,ij->i", sight, e)], axis=1) / inward[:, None]
     above = np.einsum("ij,ij->i", origins - base, n)
     return Strip(station, s, x, h, slope, above)
+
+
+def _nearest(rail: Rail, points: Float[ndarray, "k 3"]) -> Int[ndarray, "k"]:
+    """Nearest station of each point.
+
+    A rail that never turns back on its chord gives a guess at once, and a few steps along its tangents the answer; any
+    other rail, and points that have not settled, ask a KD-tree.
+    """
+    last = len(rail) - 1
+    chord = unit(rail.points[-1] - rail.points[0])
+    place = (rail.points - rail.points[0]) @ chord
+    if not (np.diff(place) > 0.3 * rail.step).all():
+        return np.asarray(KDTree(rail.points).query(points)[1], dtype=np.int64)
+    guess = np.interp((points - rail.points[0]) @ chord, place, np.arange(last + 1))
+    station = np.rint(guess).astype(np.int64)
+    move = np.zeros(len(points), dtype=np.int64)
+    for _ in range(4):
+        along = np.einsum("ij,ij->i", points - rail.points[station], rail.t[station])
+        moved = np.clip(station + np.rint(along / rail.step).astype(np.int64), 0, last)
+        move, station = moved - station, moved
+        if not move.any():
+            return station
+    wild = np.flatnonzero(np.abs(move) > 1)
+    if len(wild):
+        station[wild] = KDTree(rail.points).query(points[wild])[1]
+    return station

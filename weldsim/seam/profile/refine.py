@@ -95,7 +95,7 @@ def refine(
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
     points, origins = every, every_origin
-    fit, doubt, reach = None, 0.0, 0
+    reach = 0
     for turn in range(MOST_TURNS):
         strip = lay_out(rail, points, origins)
         inner = 0.5 * section.width + 0.7 * section.blur + 0.001
@@ -108,19 +108,15 @@ def refine(
         seen = track.weight > 0
         if np.count_nonzero(seen) < 12:
             return None
-        offset, sigma = _smoothed(rail, track)
-        sigma = np.sqrt(sigma**2 + parent.sigma**2 + doubt**2)
+        offset, strength = _smoothed(rail, track)
         settled = turn > 0 and float(np.abs(offset[seen]).max()) < SETTLED and _reach(seen) <= reach + 2
-        fit = Fit(rail, parent, grid, section, track, inner, sigma)
-        if settled:
+        if settled or turn == MOST_TURNS - 1:
             break
         reach = _reach(seen)
         rail = _advance(rail, parent, section, offset, seen)
-    assert fit is not None
-    settled = shift_rail(
-        fit.rail, offset, _opening_height(fit.parent, fit.section, offset), _slope(fit.parent, offset), respace=False
-    )
-    return replace(fit, rail=settled, track=replace(fit.track, offset=fit.track.offset - offset))
+    sigma = np.sqrt(_deviation(track, offset, strength) ** 2 + parent.sigma**2 + doubt**2)
+    final = shift_rail(rail, offset, _opening_height(parent, section, offset), _slope(parent, offset), respace=False)
+    return Fit(final, parent, grid, section, replace(track, offset=track.offset - offset), inner, sigma)
 
 
 def sided(parent: Parent, config: ProfileConfig) -> Bool[ndarray, "m"]:
@@ -318,18 +314,24 @@ def _window_sum(values: Float[ndarray, "m k"], reach: int) -> Float[ndarray, "m 
     return total[2 * reach + 1 :] - total[: -2 * reach - 1]
 
 
-def _smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:
-    """Lateral offset that puts the rail on the smooth curve through the stations, and its standard deviation [m].
+def _smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], float]:
+    """Lateral offset that puts the rail on the smooth curve through the stations [m], and how strongly it was smoothed.
 
     Beyond the stations seen, the offset stays what it was at the last one.
     """
     seen = np.nonzero(track.weight > 0)[0]
     core = slice(seen[0], seen[-1] + 1)
     target = rail.points[core] + track.offset[core, None] * rail.e[core]
-    weight = track.weight[core]
-    strength = choose_strength(target, weight)
-    curve = smooth(target, weight, strength)
+    strength = choose_strength(target, track.weight[core])
+    curve = smooth(target, track.weight[core], strength)
     offset = np.einsum("ij,ij->i", curve - rail.points[core], rail.e[core])
-    sigma = deviation(np.where(weight > 0, track.offset[core] - offset, 0.0), weight, strength)
-    pad = (seen[0], len(rail) - seen[-1] - 1)
-    return np.pad(offset, pad, mode="edge"), np.pad(sigma, pad, mode="edge")
+    return np.pad(offset, (seen[0], len(rail) - seen[-1] - 1), mode="edge"), strength
+
+
+def _deviation(track: Track, offset: Float[ndarray, "m"], strength: float) -> Float[ndarray, "m"]:
+    """Standard deviation of the smoothed lateral position at each station [m]."""
+    seen = np.nonzero(track.weight > 0)[0]
+    core = slice(seen[0], seen[-1] + 1)
+    weight = track.weight[core]
+    sigma = deviation(np.where(weight > 0, (track.offset - offset)[core], 0.0), weight, strength)
+    return np.pad(sigma, (seen[0], len(offset) - seen[-1] - 1), mode="edge")

@@ -94,5 +94,5 @@ def deviation(residual: Float[ndarray, "n"], weights: Float[ndarray, "n"], stren
         guess = guess * np.clip(float(lags[: len(near)].sum()) / max(shown, 1e-300), 1.0, 2.0)
     covariance = np.where(index < reach, guess[np.minimum(index, reach - 1)], 0.0)
     spread = matrix / np.where(root > 0, root, np.inf)[None, :]
-    variance = np.einsum("ij,jk,ik->i", spread, covariance, spread)
+    variance = ((spread @ covariance) * spread).sum(axis=1)
     return np.sqrt(np.maximum(variance, 0.0))

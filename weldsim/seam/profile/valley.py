@@ -68,9 +68,12 @@ def valley_image(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> Va
 
 def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], length: float) -> Float[ndarray, "h w"]:
     """Greatest mean of `depth` over straight lines of `length` cells through each cell: noise fades, grooves stay."""
-    half = max(2, round(length / 2))
-    best = np.zeros_like(depth, dtype=np.float32)
-    image, known = depth.astype(np.float32), valid.astype(np.float32)
+    half = max(2, round(length / 4))  # at half the resolution, which loses nothing over such lengths
+    h, w = depth.shape
+    small = (max(1, w // 2), max(1, h // 2))
+    image = cv2.resize(depth.astype(np.float32), small, interpolation=cv2.INTER_AREA)
+    known = cv2.resize(valid.astype(np.float32), small, interpolation=cv2.INTER_AREA)
+    best = np.zeros_like(image)
     for angle in np.arange(12) * np.pi / 12:
         kernel: ndarray = np.zeros((2 * half + 1, 2 * half + 1), np.uint8)
         reach = np.array([np.cos(angle), np.sin(angle)]) * half
@@ -80,6 +83,7 @@ def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], leng
         share = cv2.filter2D(known, -1, kernel, borderType=cv2.BORDER_CONSTANT)
         mean = cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_CONSTANT) / np.maximum(share, 0.6)
         best = np.maximum(best, mean)
+    best = cv2.resize(best, (w, h), interpolation=cv2.INTER_LINEAR)
     return np.where(valid, best, 0.0).astype(float)
 
 
@@ -137,7 +141,9 @@ def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> 
         mask = labels[window] == label
         if np.count_nonzero(seeds[window] & mask) < 0.25 * minimum:
             continue
-        lines += [np.add(line, (x, y)) for line in _centre_lines(mask, valleys.depth[window], minimum, config.min_width / chart.pitch)]
+        lines += [
+            np.add(line, (x, y)) for line in _centre_lines(mask, valleys.depth[window], minimum, config.min_width / chart.pitch)
+        ]
     out = []
     for line in lines:
         column, row = np.rint(line).astype(int).T
