@@ -12,33 +12,16 @@ from weldsim.seam.profile.grid import Grid, make_grid
 from weldsim.seam.profile.parent import Parent, fit_parent
 from weldsim.seam.profile.rail import Rail, lay_out, make_rail, shift_rail
 from weldsim.seam.profile.section import Section, fit_section
-from weldsim.seam.profile.smooth import choose_strength, deviation, smooth
+from weldsim.seam.profile.smooth import smooth
+from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
 BLOCK = 8  # stations averaged together for the cross-section fit
 LOOK = 0.25  # how much of an independent look one cell of such a block is worth: noise is shared over about 3.5 mm
+FEWEST_STATIONS = 12  # fewer say nothing about a groove
 MOST_TURNS = 6
 SETTLED = 2e-4  # [m] a rail that moves less than this is done
-LATERAL_REACH = 3  # stations on either side that share a look at the lateral position: as far as noise is correlated
-AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """Where the groove is, station by station.
-
-    Attributes:
-        offset: (m,) lateral position of the middle of the lips relative to the rail [m].
-        weight: (m,) its information, 0 where the groove was not seen.
-        amplitude: (m,) apparent depth over the section's depth: 1 in the groove, 0 beside it; NaN without data.
-        misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
-    """
-
-    offset: Float[ndarray, "m"]
-    weight: Float[ndarray, "m"]
-    amplitude: Float[ndarray, "m"]
-    misfit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,29 +77,75 @@ def refine(
         return None
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
-    points, origins = every, every_origin
-    reach = 0
-    for turn in range(MOST_TURNS):
-        strip = lay_out(rail, points, origins)
-        inner = 0.5 * section.width + 0.7 * section.blur + 0.001
-        parent = fit_parent(rail, strip, inner, inner + config.side_band)
-        grid = make_grid(rail, strip, parent, 0.5 * section.width + section.blur + 0.006)
-        flanked = sided(parent, config)
-        section, doubt = _fit_grid(grid, flanked, parent.noise, section)
-        section = replace(section, middle=0.0)
-        track = _follow(grid, section, flanked, attached(parent))
-        seen = track.weight > 0
-        if np.count_nonzero(seen) < 12:
+    measured = _measure(rail, section, every, every_origin, config)
+    for _ in range(MOST_TURNS - 1):
+        if measured is None:
             return None
-        offset, strength = _smoothed(rail, track)
-        settled = turn > 0 and float(np.abs(offset[seen]).max()) < SETTLED and _reach(seen) <= reach + 2
-        if settled or turn == MOST_TURNS - 1:
+        before = measured
+        rail = _advance(before.rail, before.parent, before.section, before.offset, before.track.weight > 0)
+        measured = _measure(rail, before.section, every, every_origin, config)
+        if measured is not None and measured.moved < SETTLED and measured.reach <= before.reach + 2:
             break
-        reach = _reach(seen)
-        rail = _advance(rail, parent, section, offset, seen)
-    sigma = np.sqrt(_deviation(track, offset, strength) ** 2 + parent.sigma**2 + doubt**2)
-    final = shift_rail(rail, offset, _opening_height(parent, section, offset), _slope(parent, offset), respace=False)
-    return Fit(final, parent, grid, section, replace(track, offset=track.offset - offset), inner, sigma)
+    return None if measured is None else _concluded(measured)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One turn of the fit: what was measured along a rail, and where it says the groove is.
+
+    Attributes:
+        offset: (m,) lateral position of the smoothed groove relative to the rail [m].  strength: of that smoothing.
+        doubt: standard deviation of the section's middle [m].
+    """
+
+    rail: Rail
+    parent: Parent
+    grid: Grid
+    section: Section
+    track: Track
+    inner: float
+    offset: Float[ndarray, "m"]
+    strength: float
+    doubt: float
+
+    @property
+    def moved(self) -> float:
+        """How far the groove lies from the rail at most [m]."""
+        return float(np.abs(self.offset[self.track.weight > 0]).max())
+
+    @property
+    def reach(self) -> int:
+        """Stations in the longest piece seen."""
+        core = pieces(self.track.weight > 0, 1.0, bridge=10.0)[0]
+        return core.stop - core.start
+
+
+def _measure(
+    rail: Rail, start: Section, points: Float[ndarray, "n 3"], origins: Float[ndarray, "n 3"] | None, config: ProfileConfig
+) -> Measurement | None:
+    """Parent surface, section and track along a rail, or None where hardly any groove is seen."""
+    strip = lay_out(rail, points, origins)
+    inner = 0.5 * start.width + 0.7 * start.blur + 0.001
+    parent = fit_parent(rail, strip, inner, inner + config.side_band)
+    grid = make_grid(rail, strip, parent, 0.5 * start.width + start.blur + 0.006)
+    flanked = sided(parent, config)
+    section, doubt = _fit_grid(grid, flanked, parent.noise, start)
+    section = replace(section, middle=0.0)
+    track = follow(grid, section, flanked, attached(parent))
+    if np.count_nonzero(track.weight) < FEWEST_STATIONS:
+        return None
+    offset, strength = smoothed(rail, track)
+    return Measurement(rail, parent, grid, section, track, inner, offset, strength, doubt)
+
+
+def _concluded(last: Measurement) -> Fit:
+    """The fit: the rail moved onto the smoothed groove, with its standard deviation."""
+    lateral = track_deviation(last.track, last.offset, last.strength)
+    sigma = np.sqrt(lateral**2 + last.parent.sigma**2 + last.doubt**2)
+    height = _opening_height(last.parent, last.section, last.offset)
+    rail = shift_rail(last.rail, last.offset, height, _slope(last.parent, last.offset), respace=False)
+    track = replace(last.track, offset=last.track.offset - last.offset)
+    return Fit(rail, last.parent, last.grid, last.section, track, last.inner, sigma)
 
 
 def sided(parent: Parent, config: ProfileConfig) -> Bool[ndarray, "m"]:
@@ -188,7 +217,7 @@ def _first_section(
     window = smoothed * middle * (smoothed > 0.35 * depth)
     mass = window.sum(axis=1)
     groove = mass > 0.3 * np.median(mass[flanked])
-    seen = groove & (flanked | (held & _between(groove & flanked)))
+    seen = groove & (flanked | (held & between(groove & flanked)))
     if np.count_nonzero(seen) < 12:
         return None
     centroid = np.where(seen, (window @ grid.x) / np.maximum(mass, 1e-12), 0.0)
@@ -232,106 +261,3 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     weight = LOOK * number[rows] / BLOCK
     block = np.broadcast_to(np.arange(m)[:, None], mean.shape)[rows]
     return fit_section(x[rows], shear[rows], mean[rows], weight, start, block, max(noise, 5e-5))
-
-
-def _follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> Track:
-    """Lateral position and amplitude at every station, by one Gauss-Newton step each on the fitted section.
-
-    Args:
-        flanked: (m,) stations with parent surface on both sides.  held: (m,) on one side at least: there a groove
-            that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
-    """
-    shear = np.repeat(grid.shear[:, None], len(grid.x), axis=1)
-    x = np.broadcast_to(grid.x, shear.shape)
-    model = section.depth_at(x, shear)
-    delta = 1e-4
-    slope = (section.depth_at(x - delta, shear) - section.depth_at(x + delta, shear)) / (2 * delta)
-    # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
-    with np.errstate(invalid="ignore"):
-        known = (grid.depth < 1.5 * section.depth + 0.002) & (grid.depth > -0.004)
-    # Inside the groove a stereo camera is about twice as noisy as on the plate.
-    weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
-    depth = np.where(known, grid.depth, 0.0)
-    terms = [slope * slope, model * model, slope * (depth - model), model * depth]
-    each = np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)
-    ss, mm, sd, _ = _window_sum(each, LATERAL_REACH).T
-    full = np.quantile(mm, 0.8)
-    enough = (mm > 0.35 * full) & (ss > 0)
-    amplitude = _amplitude(each, enough, flanked)
-    groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
-    seen = groove & flanked
-    shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
-    shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
-    weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & _between(seen), 0.1 * ss, 0.0)
-    if seen.any():
-        about = np.abs(shift - np.median(shift[seen]))
-        spread = 1.4826 * float(np.median(about[seen]))
-        weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
-    return Track(shift, weights, amplitude, _misfit(np.where(known, depth - model, 0.0), depth, known, seen))
-
-
-def _amplitude(each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked: Bool[ndarray, "m"]) -> Float[ndarray, "m"]:
-    """Apparent depth over the section's at each station, over the shortest window that shows it clearly."""
-    amplitude = np.full(len(each), np.nan)
-    for reach in AMPLITUDE_REACHES:
-        _, mm, _, md = _window_sum(each, reach).T
-        amplitude = np.where(enough, md / np.maximum(mm, 1e-18), np.nan)
-        core = amplitude[enough & flanked]
-        core = core[core > 0.3]
-        if len(core) < 12 or core.std() < 0.22:
-            break
-    return amplitude
-
-
-def _reach(seen: Bool[ndarray, "m"]) -> int:
-    """Stations in the longest piece."""
-    core = pieces(seen, 1.0, bridge=10.0)[0]
-    return core.stop - core.start
-
-
-def _between(seen: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
-    """Stations after the first and before the last one seen."""
-    return (np.cumsum(seen) > 0) & (np.cumsum(seen[::-1])[::-1] > 0)
-
-
-def _misfit(
-    residual: Float[ndarray, "m w"], depth: Float[ndarray, "m w"], known: Bool[ndarray, "m w"], seen: Bool[ndarray, "m"]
-) -> float:
-    """rms of the residual over the rms of the depth, both averaged over blocks of stations where the groove was seen."""
-    m = len(seen) // BLOCK
-    use = (known & seen[:, None])[: m * BLOCK].reshape(m, BLOCK, -1)
-    number = np.maximum(use.sum(axis=1), 1)
-    sums = [((image[: m * BLOCK].reshape(m, BLOCK, -1) * use).sum(axis=1) / number) ** 2 for image in (residual, depth)]
-    total = float(sums[1].sum())
-    return float(np.sqrt(sums[0].sum() / total)) if total > 0 else 1.0
-
-
-def _window_sum(values: Float[ndarray, "m k"], reach: int) -> Float[ndarray, "m k"]:
-    """Sum over each station and its neighbours within `reach`."""
-    blank = np.zeros((1, values.shape[1]))
-    edge = np.zeros((reach, values.shape[1]))
-    total = np.cumsum(np.concatenate([blank, edge, values, edge]), axis=0)
-    return total[2 * reach + 1 :] - total[: -2 * reach - 1]
-
-
-def _smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], float]:
-    """Lateral offset that puts the rail on the smooth curve through the stations [m], and how strongly it was smoothed.
-
-    Beyond the stations seen, the offset stays what it was at the last one.
-    """
-    seen = np.nonzero(track.weight > 0)[0]
-    core = slice(seen[0], seen[-1] + 1)
-    target = rail.points[core] + track.offset[core, None] * rail.e[core]
-    strength = choose_strength(target, track.weight[core])
-    curve = smooth(target, track.weight[core], strength)
-    offset = np.einsum("ij,ij->i", curve - rail.points[core], rail.e[core])
-    return np.pad(offset, (seen[0], len(rail) - seen[-1] - 1), mode="edge"), strength
-
-
-def _deviation(track: Track, offset: Float[ndarray, "m"], strength: float) -> Float[ndarray, "m"]:
-    """Standard deviation of the smoothed lateral position at each station [m]."""
-    seen = np.nonzero(track.weight > 0)[0]
-    core = slice(seen[0], seen[-1] + 1)
-    weight = track.weight[core]
-    sigma = deviation(np.where(weight > 0, (track.offset - offset)[core], 0.0), weight, strength)
-    return np.pad(sigma, (seen[0], len(offset) - seen[-1] - 1), mode="edge")
