@@ -3,6 +3,8 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
 BIN := .venv/bin
+# Threads of OpenBLAS wait for each other longer than they compute on matrices as small as ours.
+export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help set-up run test check format bench lock wheel wheel-test figures clean
 

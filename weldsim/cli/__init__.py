@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 a job that cannot succeed or a failed verdict, 2 bad input
 WELDSIM_DEBUG=1 its traceback is shown), 130 interrupted, 141 the reader of stdout went away.
 """
 
+import contextlib
 import json
 import os
 import sys
@@ -26,15 +27,18 @@ def main(args: Sequence[str] | None = None) -> int:
             if not debug:
                 warnings.simplefilter("ignore")  # of libraries; they mean nothing to who runs a command
             code = _dispatch(words)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except BrokenPipeError:
-        # Python flushes stdout once more as it ends: into nothing, then.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_stdout()
         return NO_READER
     except KeyboardInterrupt:
         return _fail("interrupted", INTERRUPTED, as_json=False)
     except WeldsimError as error:
         return _fail(str(error), error.exit_code, as_json="--json" in words)
+    except (OSError, MemoryError) as error:
+        reason = "out of memory" if isinstance(error, MemoryError) else error.strerror or str(error)
+        return _fail(f"{getattr(error, 'filename', None) or 'this machine'}: {reason}", 2, as_json="--json" in words)
     except Exception as error:
         if debug:
             traceback.print_exc()
@@ -47,6 +51,9 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _dispatch(words: list[str]) -> int:
     """Runs the command that `words` name."""
+    # The matrices here are small: threads of OpenBLAS wait for each other longer than they compute, ten times longer on a
+    # busy machine. The library reads this when numpy is first imported, which no module loaded so far does.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if words == ["--version"]:
         print(f"weldsim {__version__}")
         return 0
@@ -59,10 +66,18 @@ def _dispatch(words: list[str]) -> int:
 
 def _fail(message: str, code: int, *, as_json: bool) -> int:
     """`code`, after one line on stderr and, for machines, one object on stdout."""
+    message = " ".join(message.split())
     try:
         if as_json:
             print(json.dumps({"error": message, "exit_code": code}), flush=True)
+    except OSError:
+        _drop_stdout()
+    with contextlib.suppress(OSError):
         print(f"weldsim: {message}", file=sys.stderr, flush=True)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return code
+
+
+def _drop_stdout() -> None:
+    """Python flushes stdout once more as it ends: into nothing, then."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,5 +1,6 @@
 """Options that several commands share, and how they become a config."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
 
 Settings = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="KEY=VALUE")]
+SceneName = Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SCENE")]
 Method = Literal["profile", "thesis"]
 SCENE_PREFIX = "scene."
 
@@ -36,10 +38,13 @@ class ConfigOptions:
         return load_config(self.config, [*settings, *([f"seam.method={method}"] if method else [])])
 
     def scene_of(self, name: str) -> "SceneConfig":
-        """The scene of that name or file, with every --set that starts with `scene.`. Raises SceneError, ConfigError."""
+        """The scene of that name or file, with every --set that starts with `scene.`. Raises SceneError, ConfigError, and
+        SensorError where MUJOCO_GL holds nonsense."""
         from weldsim.scene.config import SceneConfig
         from weldsim.scene.files import scene_path
+        from weldsim.sensor.backend import gl_candidates
 
+        gl_candidates(dict(os.environ))  # a MUJOCO_GL that is no platform is told before MuJoCo is imported and fails
         path = scene_path(name)
         settings = [text.removeprefix(SCENE_PREFIX) for text in self.set if text.startswith(SCENE_PREFIX)]
         tables: dict[str, Any] = apply_overrides(load_toml(path), settings)

@@ -33,7 +33,7 @@ def check_folder(folder: Path, path: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except (OSError, ValueError) as error:
-        reason = "no such folder" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None) or str(error)
+        reason = (getattr(error, "strerror", None) or str(error)) if folder.is_dir() else "no such folder"
         raise OutputError(f"{path}: cannot be written in {folder} ({reason})", path=str(path)) from None
 
 

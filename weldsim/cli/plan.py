@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -11,7 +11,7 @@ from weldsim import units
 from weldsim.cli.options import ConfigOptions, Method, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, nearest_folder
 from weldsim.cli.show import Tell, progress, table, times
-from weldsim.errors import InputError, NoSeamError
+from weldsim.errors import CloudError, InputError, NoSeamError
 
 if TYPE_CHECKING:
     from weldsim.config import CellConfig
@@ -29,7 +29,7 @@ class Plan(ConfigOptions):
     --out nothing is written and a summary is printed.
     """
 
-    cloud: tyro.conf.Positional[Path]
+    cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="CLOUD")]
     """File with the cloud, or with a depth image (16-bit PNG, NPY)."""
 
     viewpoint: tuple[float, float, float] | None = None
@@ -120,7 +120,10 @@ class Plan(ConfigOptions):
         clock = pipeline.Clock(tell)
         with clock.stage("read"):
             cloud = self._read()
-        return pipeline.plan(cloud, config, clock=clock), clock
+        try:
+            return pipeline.plan(cloud, config, clock=clock), clock
+        except CloudError as error:
+            raise CloudError(f"{self.cloud}: {error}", **error.data) from None
 
     def _read(self) -> "PointCloud":
         """The cloud in the file. Raises CloudFileError, CloudError, ConfigError."""

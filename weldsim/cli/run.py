@@ -4,9 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import tyro
-
-from weldsim.cli.options import ConfigOptions, Method, refuse_together
+from weldsim.cli.options import ConfigOptions, Method, SceneName, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table, times
 from weldsim.errors import InputError
@@ -25,7 +23,7 @@ class Run(ConfigOptions):
     Writes a run directory and exits 1 when the verdict is FAILED.
     """
 
-    scene: tyro.conf.Positional[str]
+    scene: SceneName
     """Name of a scene (`weldsim scenes`), or a TOML file."""
 
     seed: int = 0

@@ -4,9 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import tyro
-
-from weldsim.cli.options import ConfigOptions
+from weldsim.cli.options import ConfigOptions, SceneName
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress
 from weldsim.errors import InputError
@@ -18,7 +16,7 @@ CLOUDS = (".ply", ".npz", ".xyz", ".txt")
 class Scan(ConfigOptions):
     """Let the twin scan a scene, and write what the camera saw as `weldsim plan` reads it."""
 
-    scene: tyro.conf.Positional[str]
+    scene: SceneName
     """Name of a scene (`weldsim scenes`), or a TOML file."""
 
     seed: int = 0

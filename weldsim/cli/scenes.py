@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from weldsim.cli.options import ConfigOptions
+from weldsim.cli.options import ConfigOptions, SceneName
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
@@ -19,7 +19,7 @@ class Scenes(ConfigOptions):
     action: tyro.conf.Positional[Literal["list", "show"]] = "list"
     """List all, or draw one."""
 
-    scene: tyro.conf.Positional[str] = ""
+    scene: SceneName = ""
     """With show: name of a scene, or a TOML file."""
 
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None

@@ -4,6 +4,7 @@ import contextlib
 import io
 import re
 from collections.abc import Callable, Sequence
+from itertools import groupby
 
 import tyro
 
@@ -45,15 +46,12 @@ def parse(words: Sequence[str]) -> Callable[[], int] | int:
 
 def one_line(box: str, words: Sequence[str]) -> str:
     """What stands in the box that tyro draws: its first paragraph, its guess, and where to read more."""
-    rows = [_FRAME.sub("", row).strip() for row in box.splitlines()[1:]]
-    paragraphs: list[list[str]] = [[]]
-    for row in rows:
-        if _RULE.search(row):
-            paragraphs.append([])
-        elif row:
-            paragraphs[-1].append(row)
-    message = " ".join(paragraphs[0]).rstrip(".:") or "these words make no command"
-    message = re.sub(r"\[/?bold\]|\(required\)", "", message)
+    rows = [_FRAME.sub("", row).strip() for row in box.splitlines()[1:]]  # without the title
+    groups = [[*group] for ruled, group in groupby(filter(None, rows), lambda row: _RULE.fullmatch(row) is not None) if not ruled]
+    paragraphs = groups or [[]]
+    asked = paragraphs[0][:2] if "Required options" in box else paragraphs[0]
+    message = " ".join(asked).partition(" Got errors:")[0].rstrip(".:") or "these words make no command"
+    message = re.sub(r"'None', ", "", message)
     guesses = [" ".join(rows[1:2]) for rows in paragraphs[1:] if rows and rows[0].startswith("Perhaps")]
     hint = f"; perhaps {guesses[0]}" if guesses else ""
     name = next((word for word in words[:1] if word in COMMANDS), "")
