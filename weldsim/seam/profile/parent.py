@@ -68,7 +68,8 @@ def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float) -> Parent:
     noise = 1.4826 * float(np.median(np.abs(residual[good]))) if good.any() else scale
     at = np.arange(m) * rail.step
     basis, size = _basis(at, length, knots), knots + 2
-    step, angle = _side_difference(s, x, residual, np.abs(residual) < 2 * TOLERANCE, m, rail.step)
+    # Curvature across the seam is part of the angle between the sides: it could pass a fold off as a bend.
+    step, angle = _side_difference(s, x, residual + theta[-1] * x**2, np.abs(residual) < 2 * TOLERANCE, m, rail.step)
     return Parent(
         a=basis @ theta[:size],
         b=basis @ theta[size : 2 * size],
@@ -139,9 +140,10 @@ def _solve(
     penalty: Float[ndarray, "p p"],
     target: Float[ndarray, "p"],
 ) -> Float[ndarray, "p"]:
-    normal = design.T @ (design * weight[:, None]) + penalty
-    normal[np.diag_indices_from(normal)] += 1e-9 * (1 + np.trace(normal) / len(normal))
-    return np.linalg.solve(normal, design.T @ (weight * h) + target)
+    gram = design.T @ (design * weight[:, None])
+    # Each unknown's own scale: a ridge as stiff as the penalty would hold down the curvature across the seam.
+    ridge = np.diag(1e-9 * (np.diag(gram) + 1e-6))
+    return np.linalg.solve(gram + penalty + ridge, design.T @ (weight * h) + target)
 
 
 def _choose_stiffness(
