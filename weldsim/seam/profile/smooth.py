@@ -11,19 +11,27 @@ from numpy import ndarray
 from scipy.linalg import solveh_banded
 
 ORDER = 3
+END_STIFFNESS = 30.0  # of the penalty at the ends, over that in the middle
+END_REACH = 15.0  # stations over which it falls off
+STIFFEST = 1e9  # beyond this the penalty's own rounding would outweigh FLOOR
 STRENGTHS = tuple(10.0 ** np.arange(2.0, 8.6, 0.5))  # [stations^6] from a few stations to a parabola
 FLOOR = 3e-5  # weight of a station without data, relative to the mean
 BLOCK = 36  # stations left out together in cross-validation: well beyond where noise is correlated
 
 
-def _penalty_bands(n: int) -> Float[ndarray, "b n"]:
-    """Upper bands of D'D for third differences D of n stations, in solveh_banded's layout."""
+def _penalty_bands(n: int, strength: float) -> Float[ndarray, "b n"]:
+    """Upper bands of D'WD, W about `strength`, for third differences D of n stations, in solveh_banded's layout.
+
+    W grows towards the ends, where a curve is held from one side only and would flap: there the curvature changes less.
+    """
     coefficients = np.array([-1.0, 3.0, -3.0, 1.0])
+    inward = np.minimum(np.arange(n - ORDER), np.arange(n - ORDER)[::-1])
+    stiffness = np.minimum(strength * (1.0 + END_STIFFNESS * np.exp(-inward / END_REACH)), STIFFEST)
     bands = np.zeros((ORDER + 1, n))
     for lag in range(ORDER + 1):
         for i in range(ORDER + 1 - lag):
-            start = np.arange(n - ORDER) + i
-            np.add.at(bands[ORDER - lag], start + lag, coefficients[i] * coefficients[i + lag])
+            start = i + lag
+            bands[ORDER - lag, start : start + n - ORDER] += coefficients[i] * coefficients[i + lag] * stiffness
     return bands
 
 
@@ -40,7 +48,7 @@ def smooth(values: Float[ndarray, "n d"], weights: Float[ndarray, "n"], strength
     scaled = weights / max(float(weights.mean()), 1e-300)
     # About the chord, so that the floor that keeps bridged stations well posed pulls towards a straight line.
     chord = values[0] + np.linspace(0.0, 1.0, n)[:, None] * (values[-1] - values[0])
-    bands = strength * _penalty_bands(n)
+    bands = _penalty_bands(n, strength)
     bands[-1] += scaled + FLOOR
     return chord + solveh_banded(bands, scaled[:, None] * (values - chord), check_finite=False)
 
