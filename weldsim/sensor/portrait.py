@@ -52,7 +52,7 @@ def _camera_pose(world: "World", data: object, camera: str) -> Transform:
 
 def _camera_intrinsics(world: "World", camera: str) -> CameraIntrinsics:
     """Of a WIDTH x HEIGHT picture with the camera's vertical field of view."""
-    f = HEIGHT / 2 / np.tan(np.radians(float(world.model.camera(camera).fovy[0])) / 2)
+    f = float(HEIGHT / 2 / np.tan(np.radians(float(world.model.camera(camera).fovy[0])) / 2))
     return CameraIntrinsics(width=WIDTH, height=HEIGHT, fx=f, fy=f, cx=WIDTH / 2, cy=HEIGHT / 2)
 
 

@@ -1,0 +1,193 @@
+"""`weldsim run`, `scan` and `scenes` as their users start them, and the run directory they leave."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from weldsim.cli import main
+from weldsim.cloud.files import read_cloud
+from weldsim.config import load_config, structure, to_json
+from weldsim.path.files import path_text, read_path_json
+from weldsim.scene.config import SceneConfig
+from weldsim.scene.files import scene_names
+
+pytestmark = pytest.mark.render
+
+FILES = {
+    *("config.json", "path.json", "path.csv", "cloud.ply", "depth.png", "depth.intrinsics.json", "depth.pose.json"),
+    *("report.json", "report.html", "report.png", "run.json"),
+}
+
+
+@pytest.fixture(scope="module")
+def welded(tmp_path_factory) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    """The folder in which `weldsim run straight --seed 1 --json` was started, and the finished process."""
+    folder = tmp_path_factory.mktemp("welded")
+    command = [sys.executable, "-c", "import sys; from weldsim.cli import main; sys.exit(main())"]
+    words = ["run", "straight", "--seed", "1", "--json"]
+    return folder, subprocess.run([*command, *words], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+
+
+def test_a_run_says_its_verdict_and_leaves_one_folder(welded):
+    folder, done = welded
+    report = json.loads(done.stdout)
+    assert done.stderr == ""
+    assert done.returncode == (0 if report["passed"] else 1)
+    assert [path.name for path in folder.iterdir()] == ["runs"]  # no MUJOCO_LOG.TXT, no temporary files
+    assert [path.name for path in (folder / "runs").iterdir()] == ["straight-1"]
+    assert report["written"] == ["runs/straight-1"]
+    made = folder / "runs" / "straight-1"
+    assert {path.name for path in made.iterdir()} == {*FILES, "log.npz"}
+    assert json.loads((made / "report.json").read_text())["executed"] == report["executed"]
+    manifest = json.loads((made / "run.json").read_text())
+    assert (manifest["schema"], manifest["scene"], manifest["seed"]) == ("weldsim.run/1", "straight", 1)
+    assert set(manifest["files"]) == {path.name for path in made.iterdir()} - {"run.json"}
+
+
+def test_the_weld_follows_the_plan_and_the_plan_the_seam(welded):
+    report = json.loads(welded[1].stdout)
+    assert report["plan"]["mean"] < 0.6e-3
+    assert report["executed"]["mean"] < 0.6e-3
+    assert report["tracking_p95"] < 0.3e-3
+    assert report["speed_error_p95"] < 0.02
+    assert report["phantom_seams"] == 0
+    assert report["iou"] > 0.8
+    assert list(report["timing"]) == ["scene", "sensor", "cloud", "seam", "path", "motion", "execution", "report"]
+
+
+def test_the_log_is_what_the_arm_did(welded):
+    with np.load(welded[0] / "runs/straight-1/log.npz") as log:
+        arc, tip = log["arc_on"], log["position_B"]
+        assert len(arc) == len(tip) == len(log["t"]) == len(log["q_act"]) == len(log["segments"])
+        assert set(log["segments"][arc]) == {"weld"}
+        assert np.abs(log["q_act"] - log["q_cmd"]).max() < 0.01
+        document = read_path_json(welded[0] / "runs/straight-1/path.json")
+        start, end = (np.array(document["seams"][0]["poses"][k]["position"]) for k in (0, -1))
+        assert np.linalg.norm(tip[arc][0] - start) < 1e-3
+        assert np.linalg.norm(tip[arc][-1] - end) < 1e-3
+
+
+def test_the_resolved_config_can_be_read_back(welded):
+    resolved = json.loads((welded[0] / "runs/straight-1/config.json").read_text())
+    config = load_config()
+    assert structure(resolved["cell"], type(config)) == config
+    assert to_json(structure(resolved["scene"], SceneConfig)) == resolved["scene"]
+
+
+def test_the_same_seed_gives_the_same_bytes_in_another_process_and_replaces_the_run(welded, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    old = tmp_path / "again"
+    old.mkdir()
+    (old / "run.json").write_text('{"schema": "weldsim.run/1"}')
+    (old / "left.txt").write_text("from an earlier run")
+    code = main(["run", "straight", "--seed", "1", "--out", "again"])
+    out, err = capsys.readouterr()
+    assert (code, err) == (welded[1].returncode, "")
+    assert ("PASSED" if code == 0 else "FAILED") in out.splitlines()[0]
+    paths = [read_path_json(folder / "path.json") for folder in (old, welded[0] / "runs/straight-1")]
+    assert path_text(paths[0], timing=False) == path_text(paths[1], timing=False)
+    assert (old / "depth.png").read_bytes() == (welded[0] / "runs/straight-1/depth.png").read_bytes()
+    assert not (old / "left.txt").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["again"]
+
+
+def test_a_failed_verdict_exits_1_and_is_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["--sensor", "exact", "--set", "report.mean=1 um", "--set", "scene.plate.length=120 mm", "--out", "out"]
+    assert main(["run", "straight", *words]) == 1
+    assert "FAILED" in capsys.readouterr().out.splitlines()[0]
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["passed"] is False
+
+
+def test_a_plate_without_a_seam_passes_when_none_is_found(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "plain", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["phantom_seams"] == 0
+    assert {path.name for path in (tmp_path / "runs" / "plain-0").iterdir()} == FILES
+
+
+def test_what_the_twin_scans_can_be_planned(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scan", "curve", "--seed", "4", "--out", "scan.ply", "--depth", "depth.png", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["written"] == ["scan.ply", "depth.png", "depth.intrinsics.json", "depth.pose.json"]
+    cloud = read_cloud("scan.ply")
+    assert said["points"] == len(cloud)
+    np.testing.assert_allclose(cloud.viewpoints, said["viewpoints"])
+    assert main(["plan", "scan.ply", "--json"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert main(["plan", "depth.png", "--intrinsics", "depth.intrinsics.json", "--pose", "depth.pose.json", "--json"]) == 0
+    second = json.loads(capsys.readouterr().out)
+    assert first["input"]["points"] == second["input"]["points"]
+    assert first["seams"][0]["length"] == pytest.approx(second["seams"][0]["length"], abs=0.01)
+
+
+def test_scenes_are_listed_and_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scenes"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(scene_names())
+    assert main(["scenes", "show", "curve", "-o", "curve.png"]) == 0
+    picture = cv2.imread("curve.png")
+    assert picture.shape[0] == 960
+    assert picture.shape[1] > 1800
+    assert picture.std() > 20
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "no-such-scene"],
+        ["run", "missing.toml"],
+        ["run", "straight", "--seed", "-1"],
+        ["run", "straight", "--out", "mine"],
+        ["run", "straight", "--out", "mine/notes.txt"],
+        ["run", "straight", "--out", "."],
+        ["run", "straight", "--video", "weld.avi"],
+        ["run", "straight", "--video", "no/folder/weld.mp4"],
+        ["run", "straight", "--seam", "0"],
+        ["run", "straight", "--set", "scene.groove.wdth=10 mm"],
+        ["run", "straight", "--set", "scene.groove.width=300 mm"],
+        ["run", "straight", "--set", "motion.period=0 s"],
+        ["scan", "straight", "--out", "scan.stl"],
+        ["scan", "straight", "--depth", "depth.jpg"],
+        ["scan", "straight", "--view", "2"],
+        ["scan", "straight", "--out", "no/scan.ply"],
+        ["scenes", "show", "straight"],
+        ["scenes", "show", "nothing", "-o", "x.png"],
+        ["scenes", "show", "straight", "-o", "x.jpg"],
+        ["scenes", "list", "straight"],
+    ],
+    ids=" ".join,
+)
+def test_bad_input_is_one_line_and_leaves_everything_as_it_was(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "notes.txt").write_text("keep me")
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    assert [path.name for path in mine.iterdir()] == ["notes.txt"]
+
+
+def test_a_run_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    old = tmp_path / "old"
+    old.mkdir()
+    (old / "run.json").write_text('{"schema": "weldsim.run/1"}')
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("weldsim.run_folder.write_png", fail)
+    assert main(["run", "plain", "--out", "old"]) == 2
+    assert "No space left" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
+    assert [path.name for path in old.iterdir()] == ["run.json"]
