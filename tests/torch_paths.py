@@ -12,7 +12,10 @@ START = np.array([-1.5708, -1.9199, -1.6, -1.1, 1.5708, 0.0])  # [rad] arm up ov
 
 
 def torch_path(
-    points_B: Float[ndarray, "n 3"], wire_B: Float[ndarray, "3"] | Float[ndarray, "n 3"], speed: float = 0.008, roll_free: bool = True
+    points_B: Float[ndarray, "n 3"],
+    wire_B: Float[ndarray, "3"] | Float[ndarray, "n 3"],
+    speed: float = 0.008,
+    roll_free: bool = True,
 ) -> TorchPath:
     """A WELD along points with the wire along `wire_B` and x along travel."""
     z = unit(np.broadcast_to(wire_B, points_B.shape))

@@ -67,7 +67,7 @@ def test_arrays_of_a_record_are_float64_and_cannot_be_written():
 
 
 def test_exit_codes_are_1_for_a_failed_job_and_2_for_bad_input():
-    failed_jobs = {errors.NoSeamError, errors.MotionError, errors.UnreachableError, errors.ExecutionError}
+    failed_jobs = {errors.NoSeamError, errors.PathError, errors.MotionError, errors.UnreachableError, errors.ExecutionError}
     kinds = {kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, errors.WeldsimError)}
     assert failed_jobs <= kinds
     for kind in kinds:
