@@ -21,6 +21,7 @@ from weldsim.cloud.merge import merge
 from weldsim.config import CellConfig, digest
 from weldsim.curves import project
 from weldsim.errors import InputError
+from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.plan import plan_path
 from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
 from weldsim.report.weld import weld_report
@@ -175,10 +176,10 @@ def run(
     with clock.stage("report"):
         report = weld_report(
             result.findings,
-            result.paths,
+            tuple(replace(path, X_BT=wire_tip(path.X_BT, config.path)) for path in result.paths),
             scene=scene.name,
-            log=log,
-            known=world.known_seams,
+            log=None if log is None else replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
+            known=tuple(leaned(seam, result.paths[welded], config.path) if result.paths else seam for seam in world.known_seams),
             true_region=_true_region(captures, cloud, result.cloud),
             welded=welded,
             seed=seed,

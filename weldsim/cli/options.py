@@ -38,13 +38,10 @@ class ConfigOptions:
         return load_config(self.config, [*settings, *([f"seam.method={method}"] if method else [])])
 
     def scene_of(self, name: str) -> "SceneConfig":
-        """The scene of that name or file, with every --set that starts with `scene.`. Raises SceneError, ConfigError, and
-        SensorError where MUJOCO_GL holds nonsense."""
+        """The scene of that name or file, with every --set that starts with `scene.`. Raises SceneError, ConfigError."""
         from weldsim.scene.config import SceneConfig
         from weldsim.scene.files import scene_path
-        from weldsim.sensor.backend import gl_candidates
 
-        gl_candidates(dict(os.environ))  # a MUJOCO_GL that is no platform is told before MuJoCo is imported and fails
         path = scene_path(name)
         settings = [text.removeprefix(SCENE_PREFIX) for text in self.set if text.startswith(SCENE_PREFIX)]
         tables: dict[str, Any] = apply_overrides(load_toml(path), settings)
@@ -56,3 +53,17 @@ def refuse_together(**given: object) -> None:
     names = [f"--{name.replace('_', '-')}" for name, value in given.items() if value is not None]
     if len(names) > 1:
         raise InputError(f"{' and '.join(names)} exclude each other; give one", options=names)
+
+
+def choose_platform() -> str:
+    """What draws here, an OpenGL platform or "embree"; MUJOCO_GL is set to the platform where nobody chose one.
+
+    MuJoCo reads it when it is imported, and without it may take a platform that does not draw. Raises SensorError where it
+    holds nonsense.
+    """
+    from weldsim.sensor.backend import rendering_backend
+
+    platform = rendering_backend()
+    if platform != "embree":
+        os.environ.setdefault("MUJOCO_GL", platform)
+    return platform

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from weldsim.cli.options import ConfigOptions, Method, SceneName, refuse_together
+from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table, times
-from weldsim.errors import InputError
+from weldsim.errors import InputError, SensorError
 
 if TYPE_CHECKING:
     from weldsim.config import CellConfig
@@ -62,6 +62,8 @@ class Run(ConfigOptions):
         from weldsim.run_folder import check_run_folder, write_run
 
         check_run_folder(folder)
+        if choose_platform() == "embree" and self.video is not None:
+            raise SensorError("--video: films need OpenGL, and none works here; `weldsim doctor` says what is missing")
         with progress() as tell:
             result = run(
                 scene,

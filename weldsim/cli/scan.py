@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from weldsim.cli.options import ConfigOptions, SceneName
+from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress
 from weldsim.errors import InputError
@@ -46,6 +46,7 @@ class Scan(ConfigOptions):
         config, scene = self.cell(), self.scene_of(self.scene)
         if not 1 <= self.view <= max(1, len(scene.views)):
             raise InputError(f"--view {self.view}: scene {scene.name!r} has {len(scene.views)}, counted from 1", view=self.view)
+        choose_platform()
 
         from weldsim.cloud.deproject import deproject
         from weldsim.cloud.merge import merge

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from weldsim.cli.options import ConfigOptions, SceneName
+from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
@@ -47,6 +47,7 @@ class Scenes(ConfigOptions):
         check_suffix(self.out, (".png",), "a picture")
         check_outputs((self.out,), (self.config,))
         scene = self.scene_of(self.scene)
+        choose_platform()
 
         from weldsim.output import write_whole
         from weldsim.sensor.portrait import portrait
