@@ -7,24 +7,39 @@ from weldsim.records import PointCloud, Seam, SeamFindings
 from weldsim.seam.config import SeamConfig
 from weldsim.seam.profile.find import find_seams_profile
 
-FACTORS = (0.5, 0.7, 1.4, 2.0)
+FACTORS = (0.7, 1.4)
 
 
 def with_stability(cloud: PointCloud, findings: SeamFindings, config: SeamConfig) -> SeamFindings:
     """The findings, with the greatest movement of their best centre line [m] when the threshold is multiplied by each of
-    FACTORS, infinity where the seam is lost. Unchanged where there is no seam or the method has no such threshold."""
-    if not findings.seams or findings.threshold is None or findings.method != "profile":
+    FACTORS, infinity where the seam is lost. Unchanged where there is no seam or no threshold.
+
+    Args:
+        cloud, config: what the findings were made from.
+    """
+    threshold = findings.threshold
+    if not findings.seams or threshold is None:
         return findings
-    best = findings.seams[0]
-    moved = {
-        f"{factor:g}": _movement(best, find_seams_profile(cloud, config.profile, threshold_factor=factor).seams)
-        for factor in FACTORS
-    }
-    return replace(findings, threshold=replace(findings.threshold, stability=moved))
+    moved = {}
+    for factor in FACTORS:
+        again = _seams_with(cloud, config, findings.method, threshold.value, factor)
+        moved[f"{factor:g}"] = _movement(findings.seams[0], again)
+    return replace(findings, threshold=replace(threshold, stability=moved))
+
+
+def _seams_with(cloud: PointCloud, config: SeamConfig, method: str, threshold: float, factor: float) -> tuple[Seam, ...]:
+    """The seams found with the threshold times `factor`."""
+    if method == "thesis":
+        # Loaded here: the published method compiles native loops, which the default one does not need.
+        from weldsim.seam.thesis.find import find_seams_thesis
+
+        return find_seams_thesis(cloud, replace(config.thesis, threshold=threshold * factor)).seams
+    return find_seams_profile(cloud, config.profile, threshold_factor=factor).seams
 
 
 def _movement(seam: Seam, others: tuple[Seam, ...]) -> float:
-    """Greatest distance [m] of the seam's points from the other line that runs closest to it, no further than its lips."""
+    """Greatest distance [m] of the seam's points from the other line that runs closest to it, infinity where every line
+    is further off than the groove is wide (5 mm where its width is unknown): then this seam is lost."""
     distances = [float(project(seam.points_B, other.points_B)[0].max()) for other in others]
     nearest = min(distances, default=float("inf"))
     return nearest if nearest < max(seam.width, 0.005) else float("inf")

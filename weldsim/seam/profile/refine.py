@@ -159,7 +159,7 @@ def attached(parent: Parent) -> Bool[ndarray, "m"]:
     return parent.support.max(axis=1) > 0.5
 
 
-def _eased(line: Float[ndarray, "k 3"], config: ProfileConfig) -> Float[ndarray, "k 3"]:
+def _eased(line: Float[ndarray, "k 3"], config: ProfileConfig) -> Float[ndarray, "m 3"]:
     """The coarse line without its cell steps, its ends, which wander into corners, cut by 4 mm."""
     even = resample(line, config.station_step)
     cut = min(round(0.004 / config.station_step), (len(even) - 12) // 4)
