@@ -1,5 +1,7 @@
 """The seam stage: cloud in, seams out, by the method the config names."""
 
+from threadpoolctl import threadpool_limits
+
 from weldsim.records import PointCloud, SeamFindings
 from weldsim.seam.config import SeamConfig
 from weldsim.seam.profile.find import find_seams_profile
@@ -16,4 +18,6 @@ def find_seams(cloud: PointCloud, config: SeamConfig) -> SeamFindings:
         from weldsim.seam.thesis.find import find_seams_thesis
 
         return find_seams_thesis(cloud, config.thesis)
-    return find_seams_profile(cloud, config.profile)
+    # Its matrices are a few hundred rows: threads of the BLAS library would spend their time waiting for each other.
+    with threadpool_limits(1, user_api="blas"):
+        return find_seams_profile(cloud, config.profile)
