@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from weldsim.curves import project
 from weldsim.records import PointCloud, Seam, SeamFindings
 from weldsim.seam.config import SeamConfig
@@ -38,8 +40,10 @@ def _seams_with(cloud: PointCloud, config: SeamConfig, method: str, threshold: f
 
 
 def _movement(seam: Seam, others: tuple[Seam, ...]) -> float:
-    """Greatest distance [m] of the seam's points from the other line that runs closest to it, infinity where every line
-    is further off than the groove is wide (5 mm where its width is unknown): then this seam is lost."""
-    distances = [float(project(seam.points_B, other.points_B)[0].max()) for other in others]
-    nearest = min(distances, default=float("inf"))
-    return nearest if nearest < max(seam.width, 0.005) else float("inf")
+    """Greatest distance [m] of the seam's points from the same seam found again: the line that runs closest to it over
+    half of it. Infinity where that is further off than the groove is wide (5 mm where its width is unknown)."""
+    distances = [project(seam.points_B, other.points_B)[0] for other in others]
+    nearest = min(distances, key=lambda distance: float(np.median(distance)), default=None)
+    if nearest is None or float(np.median(nearest)) > max(seam.width, 0.005):
+        return float("inf")
+    return float(nearest.max())
