@@ -7,6 +7,9 @@ import pytest
 
 from weldsim.curves import arc_length, tangents
 from weldsim.errors import RecordError
+from weldsim.path.asked import wire_tip
+from weldsim.path.config import PathConfig
+from weldsim.path.plan import plan_path
 from weldsim.records import KnownSeam, LineError, Reference, Seam, Segment, TorchPath
 from weldsim.scene.config import SceneConfig, make_workpiece, part_pose
 from weldsim.scene.files import scene_path
@@ -81,6 +84,25 @@ def test_every_figure_says_its_reference():
     assert a_seam().reference == "opening"
     figures = {name: 0.0 for name in LineError.__annotations__ if name != "reference"}
     assert LineError(**figures).reference == "opening"
+
+
+def test_positive_work_angle_leans_the_torch_to_the_right():
+    path = plan_path(a_seam(), PathConfig(work_angle=0.3))  # along x on a level plate
+    torch_body = -path.X_BT.R[:, :, 2]
+    assert torch_body[:, 1] == pytest.approx(-np.sin(0.3))
+
+
+def test_positive_travel_angle_pushes():
+    path = plan_path(a_seam(), PathConfig(travel_angle=0.3))
+    assert path.X_BT.R[:, 0, 2] == pytest.approx(np.sin(0.3))
+
+
+def test_longer_ctwd_leaves_the_tip_of_the_wire_on_the_seam():
+    config = PathConfig(travel_angle=0.3, ctwd=0.019, nominal_ctwd=0.015)
+    path = plan_path(a_seam(), config)
+    back = path.X_BT.p + 0.004 * path.X_BT.R[:, :, 2]
+    np.testing.assert_allclose(back[[0, -1]], a_seam().points_B[[0, -1]], atol=1e-12)
+    np.testing.assert_allclose(wire_tip(path.X_BT, config).p, back, atol=1e-12)
 
 
 def test_the_arc_burns_in_weld_alone():

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weldsim.curves import arc_length, project, tangents
+from weldsim.curves import arc_length, interpolate, project, tangents
 from weldsim.errors import ConfigError, PathError
 from weldsim.frames import unit
+from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.config import PathConfig
 from weldsim.path.directions import limited, one_sided, smooth, turn
 from weldsim.path.plan import plan_path
-from weldsim.records import Seam, Segment
+from weldsim.records import KnownSeam, Seam, Segment
 
 SEEDS = range(8)
 
@@ -233,3 +234,27 @@ def test_one_side_is_the_side_of_the_many():
     z = np.tile([0.0, 0.0, 1.0], (9, 1))
     sign = np.array([-1, 1, 1, 1, -1, 1, 1, 1, -1.0])
     np.testing.assert_array_equal(one_sided(z * sign[:, None]), z)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_was_asked_is_where_the_path_is(seed, reverse):
+    found, rng = seam(seed), np.random.default_rng(seed)
+    work, travel = rng.uniform(-0.5, 0.5, 2)
+    config = PathConfig(work_angle=work, travel_angle=travel, ctwd=0.021, reverse=reverse, smoothing=0.0)
+    path = plan_path(found, config)
+    known = KnownSeam(
+        opening_B=found.points_B,
+        root_B=found.points_B,
+        left_B=found.points_B,
+        right_B=found.points_B,
+        tangents_B=found.tangents_B,
+        bisectors_B=-found.normals_B,
+        s=found.s,
+    )
+    tip = wire_tip(path.X_BT, config).p
+    distance, _, s = project(tip, found.points_B)
+    assert distance.max() < 2e-5  # slerp between nodes while the torch is 6 mm away
+    wanted = unit(interpolate(found.s, leaned(known, path, config).bisectors_B, s))
+    assert turn_between(path.X_BT.R[:, :, 2], wanted).max() < 2e-3
+    assert leaned(known, path, PathConfig()) is known
