@@ -1,8 +1,9 @@
 """How long planning takes, stage by stage and by both methods: python experiments/bench/plan.py [--json] [--record].
 
 The cloud is one 640 x 480 depth frame of the straight groove by the D415 model of the twin, written and read as
-`weldsim plan` reads it; pixels without a return are given their nearest neighbour's depth, for 307,200 points. Where WELDSIM_DATA is set, the captured scan of a curved groove too. Stage times are
-medians after one run to warm up, both methods in turn in one process; then the command itself, as a process of its own.
+`weldsim plan` reads it; pixels without a return are given their nearest neighbour's depth, for 307,200 points. Where
+WELDSIM_DATA is set, the captured scan of a curved groove too. Stage times are medians after one run to warm up, both
+methods in turn in one process; then the command itself, as a process of its own.
 """
 
 import argparse
