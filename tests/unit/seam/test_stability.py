@@ -25,7 +25,7 @@ def test_it_is_told_for_either_method(method, most: float) -> None:
     told = with_stability(made.cloud, found, config)
     assert told.threshold is not None
     assert list(told.threshold.stability) == KEYS == ["0.7", "1.4"]
-    assert all(0 < move <= most for move in told.threshold.stability.values()), told.threshold.stability
+    assert all(0 <= move <= most for move in told.threshold.stability.values()), told.threshold.stability
     assert told.seams == found.seams
     assert replace(told.threshold, stability={}) == found.threshold
 
