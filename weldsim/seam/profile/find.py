@@ -20,7 +20,7 @@ from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.judge import confidence, refusal
 from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit, pieces, refine
-from weldsim.seam.profile.valley import trace_valleys, valley_image
+from weldsim.seam.profile.valley import trace_valleys, valley_images
 
 MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
 SURROUNDINGS = 0.042  # [m] points within this of a coarse line take part in its fit
@@ -34,11 +34,11 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
         threshold_factor: multiplies the coarse threshold, to see how much it matters.
     """
     chart = make_chart(cloud)
-    valleys = valley_image(chart, config, threshold_factor)
-    threshold = Threshold(name="valley depth along 25 mm", value=valleys.threshold, unit="m", noise=valleys.noise)
+    images = valley_images(chart, config, threshold_factor)
+    threshold = Threshold(name="valley depth along 25 mm", value=images[0].threshold, unit="m", noise=images[0].noise)
     accepted: list[tuple[Fit, tuple[float, float], float]] = []
     rejected: list[Rejection] = []
-    for coarse in trace_valleys(chart, valleys, config):
+    for coarse in trace_valleys(chart, images, config):
         line = coarse.points
         if coarse.level < MIN_LEVEL:
             rejected.append(_rejection(line, f"surface at one level on both sides over only {coarse.level:.0%} of it"))

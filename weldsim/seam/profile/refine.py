@@ -77,7 +77,7 @@ def refine(
         return None
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
-    measured = _measure(rail, section, every, every_origin, config)
+    measured = _measure(rail, section, every, every_origin, config, first=True)
     for _ in range(MOST_TURNS - 1):
         if measured is None:
             return None
@@ -121,7 +121,12 @@ class Measurement:
 
 
 def _measure(
-    rail: Rail, start: Section, points: Float[ndarray, "n 3"], origins: Float[ndarray, "n 3"] | None, config: ProfileConfig
+    rail: Rail,
+    start: Section,
+    points: Float[ndarray, "n 3"],
+    origins: Float[ndarray, "n 3"] | None,
+    config: ProfileConfig,
+    first: bool = False,
 ) -> Measurement | None:
     """Parent surface, section and track along a rail, or None where hardly any groove is seen."""
     strip = lay_out(rail, points, origins)
@@ -129,7 +134,7 @@ def _measure(
     parent = fit_parent(rail, strip, inner, inner + config.side_band)
     grid = make_grid(rail, strip, parent, 0.5 * start.width + start.blur + 0.006)
     flanked = sided(parent, config)
-    section, doubt = _fit_grid(grid, flanked, parent.noise, start)
+    section, doubt = _fit_grid(grid, flanked, parent.noise, start, first)
     section = replace(section, middle=0.0)
     track = follow(grid, section, flanked, attached(parent))
     if np.count_nonzero(track.weight) < FEWEST_STATIONS:
@@ -240,7 +245,7 @@ def _bridged(grid: Grid) -> Float[ndarray, "m w"]:
     return out
 
 
-def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section) -> tuple[Section, float]:
+def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, first: bool) -> tuple[Section, float]:
     """The section fitted to blocks of stations, each with its own shear, and its middle's standard deviation [m]."""
     m = len(grid.depth) // BLOCK
     use = grid.depth[: m * BLOCK].reshape(m, BLOCK, -1)
@@ -260,4 +265,4 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     rows = np.repeat(keep[:, None], mean.shape[1], axis=1) & (number > 0)
     weight = LOOK * number[rows] / BLOCK
     block = np.broadcast_to(np.arange(m)[:, None], mean.shape)[rows]
-    return fit_section(x[rows], shear[rows], mean[rows], weight, start, block, max(noise, 5e-5))
+    return fit_section(x[rows], shear[rows], mean[rows], weight, start, block, max(noise, 5e-5), first=first)

@@ -14,6 +14,8 @@ from numpy import ndarray
 from scipy.optimize import least_squares
 
 LEAN_SCORE = 3.6  # standard deviations by which a lean must stand out from block to block
+FIRST_STARTS = ((4e-4, 0.1), (3e-3, 0.1), (6e-3, 0.1), (4e-4, 0.7))  # blur [m], floor
+LEAN_GAIN = 0.5  # a lean that halves the cost needs no vote
 LIKELY_LEAN = 0.02  # of the width: the standard deviation of a lean that went unnoticed
 EDGE = 5e-5  # [m] width given to a vertical wall
 
@@ -91,6 +93,8 @@ def fit_section(
     start: Section,
     block: Int[ndarray, "k"],
     noise: float,
+    *,
+    first: bool = False,
 ) -> tuple[Section, float]:
     """The section that fits depths measured at x, and its middle's standard deviation [m].
 
@@ -102,11 +106,22 @@ def fit_section(
         x, shear, depth, weight: (k,) cells of the strip; weight = how many independent looks each cell is worth.
         start: initial values.  noise: standard deviation of one look [m].
         block: (k,) which stretch of the seam each cell belongs to; noise is taken as independent between stretches.
+        first: `start` is a rough guess: begin from sharp, blurred, V and square sections, and keep the best. Blur can
+            stand in for a floor, so one start may end in the wrong one.
     """
-    plain = _solve(x, shear, depth, weight, start, noise, symmetric=True)
+    starts = [replace(start, blur=blur, floor=floor) for blur, floor in FIRST_STARTS] if first else [start]
+    plain, cost = min((_solve(x, shear, depth, weight, each, noise, symmetric=True) for each in starts), key=lambda found: found[1])
     score, sigma, exchange = _lean_evidence(plain, x, shear, depth, weight, block)
-    if abs(score) > LEAN_SCORE:
-        return _solve(x, shear, depth, weight, plain, noise, symmetric=False), abs(exchange) * sigma
+    leaning = [start] if start.lean else []
+    if first or abs(score) > LEAN_SCORE:
+        width = max(start.width, plain.width)
+        leaning += [plain, *(replace(plain, lean=side * width, width=width, blur=4e-4, floor=0.1) for side in (0.35, -0.35))]
+    if leaning:
+        solved = (_solve(x, shear, depth, weight, each, noise, symmetric=False) for each in leaning)
+        best, lower = min(solved, key=lambda found: found[1])
+        if abs(score) > LEAN_SCORE or lower < LEAN_GAIN * cost:
+            _, sigma, exchange = _lean_evidence(best, x, shear, depth, weight, block)
+            return best, min(abs(exchange) * sigma, 0.1 * best.width)
     allowed = LIKELY_LEAN * plain.width
     return plain, abs(exchange) / float(np.hypot(1 / max(sigma, 1e-9), 1 / allowed))
 
@@ -152,8 +167,8 @@ def _solve(
     noise: float,
     *,
     symmetric: bool,
-) -> Section:
-    """The section of least cost, symmetric or not."""
+) -> tuple[Section, float]:
+    """The section of least cost, symmetric or not, and that cost."""
     root = np.sqrt(weight) / max(noise, 1e-6)
     scale = np.array([1e-3, 1e-3, 1e-3, 0.2, 1e-3, 1e-3])
     prior = np.array([0.0, 0.0, 0.0, 0.25, 0.4 * start.width, 0.0])
@@ -176,4 +191,4 @@ def _solve(
     solution = least_squares(residuals, guess, bounds=bounds, loss="soft_l1", f_scale=3.0, max_nfev=20, xtol=1e-4, ftol=1e-4)
     full = first.copy()
     full[free] = solution.x * scale[free]
-    return Section(**dict(zip(NAMES, full.tolist(), strict=True)))
+    return Section(**dict(zip(NAMES, full.tolist(), strict=True))), float(solution.cost)

@@ -18,6 +18,9 @@ from weldsim.seam.profile.chart import Chart
 
 MAX_LINES = 16
 LINE = 0.025  # [m] length over which a valley is averaged along itself
+MODE_REACH = 0.35  # slopes this far from a mode, either way, belong to it
+MODE_SHARE = 0.10  # of the cells that a slope must have to get a valley image of its own
+MOST_MODES = 3
 FAR = 10.0  # [m] stands for "no material" in the closing
 
 
@@ -27,6 +30,7 @@ class ValleyImage:
     depth: (h, w) how far the closed surface lies above the measured one [m], 0 where not valid.
     lined: (h, w) the same averaged along the best of twelve short straight lines through each cell [m].
     lid: (h, w) the closed surface [m, chart height]: the parent surface across a groove.
+    around: (h, w) cells of the slope this image was made for.
     threshold: `lined` that counts as valley [m].  low: down to which a valley already found goes on [m].
     noise: robust standard deviation of `lined` over the chart [m].
     """
@@ -34,16 +38,33 @@ class ValleyImage:
     depth: Float[ndarray, "h w"]
     lined: Float[ndarray, "h w"]
     lid: Float[ndarray, "h w"]
+    around: Bool[ndarray, "h w"]
     threshold: float
     low: float
     noise: float
 
 
-def valley_image(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> ValleyImage:
-    """The valley image of a chart, and the threshold its own background asks for, times `factor`."""
+def valley_images(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> list[ValleyImage]:
+    """The valley image of each slope that much of the chart has, the commonest first.
+
+    A groove on a part tilted far from the table has no lowest line as the table sees it; so heights are taken off the
+    part's own slope, and the part's own background sets the threshold, times `factor`.
+    """
+    slope = _local_slope(chart)
+    images = []
+    for mode in _slope_modes(slope[chart.valid][::3]):
+        within = chart.valid & (np.abs(slope - mode).max(axis=-1) < MODE_REACH)
+        images.append(_valley_image(chart, mode, within, config, factor))
+    return images
+
+
+def _valley_image(
+    chart: Chart, slope: Float[ndarray, "2"], within: Bool[ndarray, "h w"], config: ProfileConfig, factor: float
+) -> ValleyImage:
+    """The valley image of the cells `within`, heights taken off a slope [1, along rows and columns]."""
     valid = chart.valid
-    # On the dominant plane's slope a step down the slope would look like a valley; heights are taken off that plane.
-    plane = _dominant_plane(chart)
+    h, w = valid.shape
+    plane = chart.pitch * (slope[0] * np.arange(h)[:, None] + slope[1] * np.arange(w)[None, :])
     flat = _without_spikes(chart.height - plane, valid)
     sigma = 0.0013 / chart.pitch
     weight = cv2.GaussianBlur(valid.astype(np.float64), (0, 0), sigma)
@@ -58,12 +79,13 @@ def valley_image(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> Va
     lid = closed[border:-border, border:-border]
     depth = np.where(valid, np.maximum(lid - smooth, 0.0), 0.0)
     lined = _along_lines(depth, valid, LINE / chart.pitch)
-    background = lined[valid]
+    background = lined[within]
     middle = float(np.median(background))
     noise = 1.4826 * float(np.median(np.abs(background - middle)))
     threshold = max(middle + config.detection_factor * noise, config.min_depth) * factor
     low = max(middle + 0.55 * config.detection_factor * noise, 0.5 * config.min_depth) * factor
-    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + plane, threshold, low, noise)
+    around = cv2.morphologyEx(within.astype(np.uint8), cv2.MORPH_CLOSE, disc) > 0  # with the grooves that cross it
+    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + plane, around & valid, threshold, low, noise)
 
 
 def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], length: float) -> Float[ndarray, "h w"]:
@@ -94,19 +116,36 @@ def _without_spikes(height: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"]) 
     return np.where(valid & (np.abs(height - median) > 0.003) & (median > -0.5 * FAR), median, height)
 
 
-def _dominant_plane(chart: Chart) -> Float[ndarray, "h w"]:
-    """The plane most of the chart lies in or parallel to, as an image: the median slope of its cells."""
-    h, w = chart.height.shape
-    reach = max(2, min(8, h // 4, w // 4))
-    slopes = []
-    for axis in (0, 1):
-        ahead = np.take(chart.height, np.arange(reach, chart.height.shape[axis]), axis=axis)
-        behind = np.take(chart.height, np.arange(0, chart.height.shape[axis] - reach), axis=axis)
-        both = np.take(chart.valid, np.arange(reach, chart.height.shape[axis]), axis=axis) & np.take(
-            chart.valid, np.arange(0, chart.height.shape[axis] - reach), axis=axis
-        )
-        slopes.append(float(np.median((ahead - behind)[both])) / reach if both.any() else 0.0)
-    return slopes[0] * np.arange(h)[:, None] + slopes[1] * np.arange(w)[None, :]
+def _local_slope(chart: Chart) -> Float[ndarray, "h w 2"]:
+    """Slope of the chart at each cell along rows and columns [1], over about 10 mm; infinite where not measured."""
+    h, w = chart.valid.shape
+    reach = max(1, min(round(0.005 / chart.pitch), h // 4, w // 4))
+    out = np.full((h, w, 2), np.inf)
+    height = np.where(chart.valid, chart.height, np.nan)
+    out[reach:-reach, :, 0] = (height[2 * reach :] - height[: -2 * reach]) / (2 * reach)
+    out[:, reach:-reach, 1] = (height[:, 2 * reach :] - height[:, : -2 * reach]) / (2 * reach)
+    return np.where(np.isfinite(out), out / chart.pitch, np.inf)
+
+
+def _slope_modes(slopes: Float[ndarray, "n 2"]) -> list[Float[ndarray, "2"]]:
+    """The slopes that a share of at least MODE_SHARE of the cells have, the commonest first, at most MOST_MODES."""
+    known = slopes[np.isfinite(slopes).all(axis=1)]
+    if len(known) == 0:
+        return [np.zeros(2)]
+    modes: list[Float[ndarray, "2"]] = []
+    left = known
+    while len(modes) < MOST_MODES and len(left) >= MODE_SHARE * len(known):
+        bins = np.floor(left / (MODE_REACH / 2)).astype(np.int64)
+        _, which, count = np.unique(bins, axis=0, return_inverse=True, return_counts=True)
+        centre = np.median(left[which.ravel() == count.argmax()], axis=0)
+        for _ in range(2):
+            centre = np.median(left[np.abs(left - centre).max(axis=1) < MODE_REACH], axis=0)
+        near = np.abs(left - centre).max(axis=1) < MODE_REACH
+        if modes and np.count_nonzero(near) < MODE_SHARE * len(known):
+            break
+        modes.append(centre)
+        left = left[np.abs(left - centre).max(axis=1) >= 1.5 * MODE_REACH]
+    return modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +163,17 @@ class CoarseLine:
     level: float
 
 
-def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
-    """Coarse centre lines, one for each elongated valley, the strongest first."""
-    seeds = valleys.lined > valleys.threshold
-    extent = ((valleys.lined > valleys.low) & (valleys.depth > 0.4 * valleys.lined)).astype(np.uint8)
+def trace_valleys(chart: Chart, images: list[ValleyImage], config: ProfileConfig) -> list[CoarseLine]:
+    """Coarse centre lines, one for each elongated valley of each image, the strongest first."""
+    lines = [line for valleys in images for line in _trace(chart, valleys, config)]
+    lines.sort(key=lambda line: -line.evidence * line.level)
+    return lines[:MAX_LINES]
+
+
+def _trace(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
+    """Coarse centre lines, one for each elongated valley of an image."""
+    seeds = (valleys.lined > valleys.threshold) & valleys.around
+    extent = (valleys.around & (valleys.lined > valleys.low) & (valleys.depth > 0.4 * valleys.lined)).astype(np.uint8)
     if config.min_width / chart.pitch >= 3:  # cell-wide threads run along the steps of outer edges
         extent = cv2.morphologyEx(extent, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     number, labels, stats, _ = cv2.connectedComponentsWithStats(extent, connectivity=8)
@@ -154,8 +200,7 @@ def trace_valleys(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> 
             keep = slice(0, len(line))  # stays a candidate only to be named among the refused
         evidence = float(valleys.lined[row[keep], column[keep]].sum())
         out.append(CoarseLine(points[keep], evidence, float(level[keep].mean())))
-    out.sort(key=lambda line: -line.evidence * line.level)
-    return out[:MAX_LINES]
+    return out
 
 
 def _longest_run(level: Bool[ndarray, "k"], bridge: int) -> slice:
