@@ -15,13 +15,12 @@ class ProfileConfig:
     Attributes:
         min_width, max_width: opening widths accepted [m].
         min_length: shortest seam accepted [m].
-        min_depth: shallowest groove accepted, as the sensor shows it [m].
+        min_depth: shallowest groove accepted, as the sensor shows it [m]; a D415 counts in steps of 1 mm.
         search_width: width of the window that closes valleys in the coarse search [m]; wider than max_width.
         side_band: how far beyond each lip the parent surface is read [m].
         station_step: spacing of the cross-sections along the seam [m].
         max_side_angle: largest angle between the parent surfaces left and right of a groove [rad].
         max_side_step: largest height difference between them at the groove [m].
-        max_gap: longest stretch without a visible groove that still joins two pieces into one seam [m].
         detection_factor: detection threshold in robust standard deviations of the valley image above its median.
         points_per_metre: at most this many points for each metre of coarse line are used for its fit [1/m], evenly thinned.
     """
@@ -29,13 +28,12 @@ class ProfileConfig:
     min_width: Metre = 0.0045
     max_width: Metre = 0.028
     min_length: Metre = 0.030
-    min_depth: Metre = 0.0006
+    min_depth: Metre = 0.0010
     search_width: Metre = 0.036
     side_band: Metre = 0.022
     station_step: Metre = 0.001
     max_side_angle: Radian = 0.30
     max_side_step: Metre = 0.003
-    max_gap: Metre = 0.030
     detection_factor: float = 4.0
     points_per_metre: float = 100_000.0
 

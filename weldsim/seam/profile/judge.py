@@ -8,6 +8,7 @@ from weldsim.seam.profile.refine import Fit
 
 MISFIT_LIMIT = 0.75
 MIN_SUPPORT = 0.5
+MOST_LAPSES = 0.18
 MIN_STANDING = 9.0
 NOISE_REACH = 0.007  # [m] over which a stereo camera's noise is shared
 
@@ -24,6 +25,7 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> str |
         (length < 2.0 * section.width, f"{length * 1e3:.1f} mm long, under twice its width of {section.width * 1e3:.1f} mm"),
         (_shown_depth(fit) < config.min_depth, f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {config.min_depth * 1e3:.2f} mm"),
         (fit.track.misfit > MISFIT_LIMIT, f"cross-sections fit a groove poorly ({fit.track.misfit:.2f}, limit {MISFIT_LIMIT})"),
+        (_lapses(fit) > MOST_LAPSES, f"depth comes and goes, absent over {_lapses(fit):.0%} of it: a row of holes, or noise"),
         (contrast < 4.0, f"depth is {contrast:.1f} times its own scatter, under 4"),
         (standing < MIN_STANDING, f"depth and length stand {standing:.1f} times over the noise, under {MIN_STANDING:g}"),
         (support < MIN_SUPPORT, f"parent surface on both sides over {support:.0%} of it, under {MIN_SUPPORT:.0%}"),
@@ -44,12 +46,20 @@ def _shown_depth(fit: Fit) -> float:
     return float(np.max(fit.section.depth_at(fit.grid.x, np.full_like(fit.grid.x, float(np.median(fit.grid.shear))))))
 
 
+def _lapses(fit: Fit) -> float:
+    """Fraction of the stations, from the first to the last seen, at which a short look shows hardly any depth."""
+    seen = np.flatnonzero(fit.track.weight > 0)
+    local = fit.track.local[seen[0] : seen[-1] + 1]
+    known = np.isfinite(local)
+    return float(np.mean(local[known] < 0.4)) if known.any() else 1.0
+
+
 def _standing(fit: Fit, length: float) -> float:
     """Depth over the parent surface's noise, times the root of how many independent looks the length affords.
 
     Correlated noise now and then draws a short shallow furrow; a groove is deeper or longer.
     """
-    return _shown_depth(fit) / max(fit.parent.noise, 1e-6) * float(np.sqrt(max(length, 0.0) / NOISE_REACH))
+    return _shown_depth(fit) / max(fit.parent.noise, fit.parent.rms, 1e-6) * float(np.sqrt(max(length, 0.0) / NOISE_REACH))
 
 
 def _contrast(fit: Fit) -> float:

@@ -24,6 +24,7 @@ class Parent:
     Attributes:
         a, b: (m,) at each station [m], [1].  c: curvature term [1/m].
         noise: robust standard deviation of the cells about it [m].
+    rms: root mean square of the cells about it [m]; unlike `noise` not blind to data that jump between whole steps.
     sigma: standard deviation of its height at the groove [m], with the noise's own correlation.
         step, angle: (m,) height difference [m] and angle [rad] between the surfaces left and right of each station, each
         carried to its middle; infinity where either is missing.
@@ -33,6 +34,7 @@ class Parent:
     b: Float[ndarray, "m"]
     c: float
     noise: float
+    rms: float
     sigma: float
     step: Float[ndarray, "m"]
     angle: Float[ndarray, "m"]
@@ -75,6 +77,7 @@ def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float) -> Parent:
         b=basis @ theta[size : 2 * size],
         c=float(theta[-1]),
         noise=noise,
+        rms=float(np.sqrt(np.mean(residual[good] ** 2))) if good.any() else scale,
         sigma=_height_sigma(s[good], x[good], residual[good]),
         step=step,
         angle=angle,

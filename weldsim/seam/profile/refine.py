@@ -19,6 +19,7 @@ EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, ea
 BLOCK = 8  # stations averaged together for the cross-section fit
 LOOK = 0.25  # how much of an independent look one cell of such a block is worth: noise is shared over about 3.5 mm
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
+FEWEST_CELLS = 40  # fewer do not fix a cross-section
 MOST_TURNS = 6
 SETTLED = 2e-4  # [m] a rail that moves less than this is done
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
@@ -264,5 +265,7 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
     rows = np.repeat(keep[:, None], mean.shape[1], axis=1) & (number > 0)
     weight = LOOK * number[rows] / BLOCK
+    if np.count_nonzero(rows) < FEWEST_CELLS:
+        return start, 0.0
     block = np.broadcast_to(np.arange(m)[:, None], mean.shape)[rows]
     return fit_section(x[rows], shear[rows], mean[rows], weight, start, block, max(noise, 5e-5), first=first)

@@ -24,12 +24,14 @@ class Track:
         offset: (m,) lateral position of the middle of the lips relative to the rail [m].
         weight: (m,) its information, 0 where the groove was not seen.
         amplitude: (m,) apparent depth over the section's depth: 1 in the groove, 0 beside it; NaN without data.
-        misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
+        local: (m,) the same from the shortest look, noisier.
+    misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
     """
 
     offset: Float[ndarray, "m"]
     weight: Float[ndarray, "m"]
     amplitude: Float[ndarray, "m"]
+    local: Float[ndarray, "m"]
     misfit: float
 
 
@@ -56,7 +58,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     ss, mm, sd, _ = _window_sum(each, LATERAL_REACH).T
     full = np.quantile(mm, 0.8)
     enough = (mm > 0.35 * full) & (ss > 0)
-    amplitude = _amplitude(each, enough, flanked)
+    amplitude, local = _amplitude(each, enough, flanked)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
@@ -66,20 +68,23 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
-    return Track(shift, weights, amplitude, _misfit(np.where(known, depth - model, 0.0), depth, known, seen))
+    return Track(shift, weights, amplitude, local, _misfit(np.where(known, depth - model, 0.0), depth, known, seen))
 
 
-def _amplitude(each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked: Bool[ndarray, "m"]) -> Float[ndarray, "m"]:
-    """Apparent depth over the section's at each station, over the shortest window that shows it clearly."""
-    amplitude = np.full(len(each), np.nan)
+def _amplitude(
+    each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked: Bool[ndarray, "m"]
+) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:
+    """Apparent depth over the section's at each station, over the shortest window that shows it clearly, and over the
+    shortest of all."""
+    looks = []
     for reach in AMPLITUDE_REACHES:
         _, mm, _, md = _window_sum(each, reach).T
-        amplitude = np.where(enough, md / np.maximum(mm, 1e-18), np.nan)
-        core = amplitude[enough & flanked]
+        looks.append(np.where(enough, md / np.maximum(mm, 1e-18), np.nan))
+        core = looks[-1][enough & flanked]
         core = core[core > 0.3]
         if len(core) < 12 or core.std() < 0.22:
             break
-    return amplitude
+    return looks[-1], looks[0]
 
 
 def between(seen: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:

@@ -79,11 +79,11 @@ def _valley_image(
     lid = closed[border:-border, border:-border]
     depth = np.where(valid, np.maximum(lid - smooth, 0.0), 0.0)
     lined = _along_lines(depth, valid, LINE / chart.pitch)
-    background = lined[within]
+    background = lined[within] if within.any() else lined[valid]
     middle = float(np.median(background))
     noise = 1.4826 * float(np.median(np.abs(background - middle)))
-    threshold = max(middle + config.detection_factor * noise, config.min_depth) * factor
-    low = max(middle + 0.55 * config.detection_factor * noise, 0.5 * config.min_depth) * factor
+    threshold = max(middle + config.detection_factor * noise, 0.6 * config.min_depth) * factor
+    low = max(middle + 0.55 * config.detection_factor * noise, 0.3 * config.min_depth) * factor
     around = cv2.morphologyEx(within.astype(np.uint8), cv2.MORPH_CLOSE, disc) > 0  # with the grooves that cross it
     return ValleyImage(depth, lined, np.where(valid, lid, smooth) + plane, around & valid, threshold, low, noise)
 
@@ -138,9 +138,10 @@ def _slope_modes(slopes: Float[ndarray, "n 2"]) -> list[Float[ndarray, "2"]]:
         bins = np.floor(left / (MODE_REACH / 2)).astype(np.int64)
         _, which, count = np.unique(bins, axis=0, return_inverse=True, return_counts=True)
         centre = np.median(left[which.ravel() == count.argmax()], axis=0)
-        for _ in range(2):
-            centre = np.median(left[np.abs(left - centre).max(axis=1) < MODE_REACH], axis=0)
         near = np.abs(left - centre).max(axis=1) < MODE_REACH
+        if near.any():
+            centre = np.median(left[near], axis=0)
+            near = np.abs(left - centre).max(axis=1) < MODE_REACH
         if modes and np.count_nonzero(near) < MODE_SHARE * len(known):
             break
         modes.append(centre)
