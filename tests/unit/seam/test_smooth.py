@@ -71,7 +71,6 @@ def test_the_chosen_strength_is_near_the_best_there_is(bow: float, wave: float) 
     assert max(made) < 5e-4
 
 
-@pytest.mark.xfail(strict=True, reason="told about half of what it is: the smoother's own leftovers pass for anticorrelation")
 @pytest.mark.parametrize(("reach", "strength"), [(0.3, 1e4), (1.0, 1e4), (2.0, 1e6), (3.0, 1e8)])
 def test_the_error_bar_agrees_with_monte_carlo(reach: float, strength: float) -> None:
     n, sigma, runs = 160, 3e-4, 30

@@ -9,7 +9,7 @@ from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.records import PointCloud
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.chart import make_chart
-from weldsim.seam.profile.valley import trace_valleys, valley_image
+from weldsim.seam.profile.valley import trace_valleys, valley_images
 
 CONFIG = ProfileConfig()
 Height = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -29,7 +29,7 @@ def sheet(
 
 def lines(cloud: PointCloud, config: ProfileConfig = CONFIG) -> list:
     chart = make_chart(cloud)
-    return [line for line in trace_valleys(chart, valley_image(chart, config), config) if line.level >= 0.5]
+    return [line for line in trace_valleys(chart, valley_images(chart, config), config) if line.level >= 0.5]
 
 
 def v_groove(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -104,9 +104,9 @@ def test_the_threshold_follows_the_noise_and_the_factor() -> None:
     values, config = [], ProfileConfig(min_depth=1e-6)
     for noise in (1e-4, 8e-4):
         chart = make_chart(sheet(NO_VALLEYS["plane"], np.random.default_rng(4), noise=noise))
-        image = valley_image(chart, config)
+        image = valley_images(chart, config)[0]
         values.append(image.threshold)
-        assert valley_image(chart, config, 1.4).threshold == pytest.approx(1.4 * image.threshold)
+        assert valley_images(chart, config, 1.4)[0].threshold == pytest.approx(1.4 * image.threshold)
         assert (image.depth >= 0).all()
         assert (image.lined[~chart.valid] == 0).all()
     assert values[1] > 3 * values[0]

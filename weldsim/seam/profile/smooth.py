@@ -15,6 +15,8 @@ END_STIFFNESS = 30.0  # of the penalty at the ends, over that in the middle
 END_REACH = 15.0  # stations over which it falls off
 STIFFEST = 1e9  # beyond this the penalty's own rounding would outweigh FLOOR
 STRENGTHS = tuple(10.0 ** np.arange(2.0, 8.6, 0.5))  # [stations^6] from a few stations to a parabola
+LENGTHS = (0.6, 2.0, 3.5, 5.0, 7.0, 10.0, 14.0)  # [stations] correlation lengths tried for the noise
+PROBES = 32  # columns of noise by which the smoother is probed
 FLOOR = 3e-5  # weight of a station without data, relative to the mean
 BLOCK = 36  # stations left out together in cross-validation: well beyond where noise is correlated
 
@@ -77,30 +79,42 @@ def choose_strength(values: Float[ndarray, "n d"], weights: Float[ndarray, "n"])
 def deviation(residual: Float[ndarray, "n"], weights: Float[ndarray, "n"], strength: float) -> Float[ndarray, "n"]:
     """Standard deviation of a smoothed scalar at each station, from its residuals and their autocorrelation.
 
-    The smoother is linear, x = S y, so its covariance is S C S'. C is taken as stationary after scaling by each
-    station's weight: its autocovariance comes from the residuals, tapered so that it stays positive.
+    The smoother is linear, x = S y, so its covariance is S C S'. C is stationary after scaling by each station's weight,
+    with a Gaussian correlation whose variance and length are those that make residuals like ours: the smoother takes part
+    of the noise away with the signal, so the residuals' own autocovariance would tell too little.
     """
     n = len(residual)
     used = weights > 0
-    if used.sum() < 8:
+    if used.sum() < 8 or n <= ORDER + 1:
         return np.full(n, float(np.abs(residual).max()) if n else 0.0)
     root = np.sqrt(np.where(used, weights, 0.0) / weights[used].mean())
-    white = residual * root
-    matrix = smooth(np.eye(n), weights, strength)
-    reach = min(BLOCK, n - 1)
-    lags = np.array([float(white[: n - k] @ white[k:]) for k in range(reach)]) / used.sum()
-    taper = 1.0 - np.arange(reach) / reach
-    index = np.abs(np.arange(n)[:, None] - np.arange(n)[None, :])
-    missed = np.diag(used.astype(float)) - matrix * used[:, None]
-    guess = lags * taper
-    for _ in range(3):
-        # What the smoother took away with the noise is given back: residuals of this covariance should look like ours.
-        covariance = np.where(index < reach, guess[np.minimum(index, reach - 1)], 0.0)
-        expected = missed @ covariance @ missed.T
-        near = range(min(8, reach))
-        shown = sum(float(np.trace(expected, offset=k)) for k in near) / used.sum()
-        guess = guess * np.clip(float(lags[: len(near)].sum()) / max(shown, 1e-300), 1.0, 2.0)
-    covariance = np.where(index < reach, guess[np.minimum(index, reach - 1)], 0.0)
-    spread = matrix / np.where(root > 0, root, np.inf)[None, :]
-    variance = ((spread @ covariance) * spread).sum(axis=1)
-    return np.sqrt(np.maximum(variance, 0.0))
+    reach = min(BLOCK, n // 2)
+    seen = _autocovariance((residual * root)[:, None], reach)
+    best, variance, length = np.inf, 0.0, LENGTHS[0]
+    probes = np.random.default_rng(0).standard_normal((n, PROBES))
+    for candidate in LENGTHS:
+        noise = _correlated(probes, candidate)
+        raw = noise / np.where(used, root, np.inf)[:, None]
+        shown = _autocovariance((raw - smooth(raw, weights, strength)) * root[:, None], reach)
+        scale = max(float(seen @ shown) / float(shown @ shown), 0.0)
+        misfit = float(((seen - scale * shown) ** 2).sum())
+        if misfit < best:
+            best, variance, length = misfit, scale, candidate
+    lag = np.arange(n)
+    covariance = (variance * np.exp(-((lag / length) ** 2)))[np.abs(lag[:, None] - lag[None, :])]
+    spread = smooth(np.eye(n), weights, strength) / np.where(used, root, np.inf)[None, :]
+    return np.sqrt(np.maximum(((spread @ covariance) * spread).sum(axis=1), 0.0))
+
+
+def _autocovariance(values: Float[ndarray, "n d"], reach: int) -> Float[ndarray, "k"]:
+    """Autocovariance at lags 0 to reach - 1, averaged over the columns."""
+    n = len(values)
+    return np.array([float((values[: n - k] * values[k:]).sum()) / values.size for k in range(reach)])
+
+
+def _correlated(white: Float[ndarray, "n d"], length: float) -> Float[ndarray, "n d"]:
+    """Columns of unit variance with autocorrelation exp(-(lag / length)^2), made from white ones."""
+    n = len(white)
+    lag = np.minimum(np.arange(n), n - np.arange(n))
+    power = np.maximum(np.fft.rfft(np.exp(-((lag / length) ** 2))).real, 0.0)
+    return np.fft.irfft(np.fft.rfft(white, axis=0) * np.sqrt(power)[:, None], n, axis=0)
