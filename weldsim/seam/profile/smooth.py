@@ -11,14 +11,14 @@ from numpy import ndarray
 from scipy.linalg import solveh_banded
 
 ORDER = 3
-END_STIFFNESS = 30.0  # of the penalty at the ends, over that in the middle
+END_STIFFNESS = 100.0  # of the penalty at the ends, over that in the middle
 END_REACH = 15.0  # stations over which it falls off
 STIFFEST = 1e9  # beyond this the penalty's own rounding would outweigh FLOOR
 STRENGTHS = tuple(10.0 ** np.arange(2.0, 8.6, 0.5))  # [stations^6] from a few stations to a parabola
 LENGTHS = (0.6, 2.0, 3.5, 5.0, 7.0, 10.0, 14.0)  # [stations] correlation lengths tried for the noise
 PROBES = 32  # columns of noise by which the smoother is probed
 FLOOR = 3e-5  # weight of a station without data, relative to the mean
-BLOCK = 36  # stations left out together in cross-validation: well beyond where noise is correlated
+BLOCK = 24  # stations left out together in cross-validation: well beyond where noise is correlated
 
 
 def _penalty_bands(n: int, strength: float) -> Float[ndarray, "b n"]:
