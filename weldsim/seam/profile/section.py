@@ -14,7 +14,8 @@ from numpy import ndarray
 from scipy.optimize import least_squares
 
 LEAN_SCORE = 3.6  # standard deviations by which a lean must stand out from block to block
-FIRST_STARTS = ((4e-4, 0.1), (3e-3, 0.1), (6e-3, 0.1), (4e-4, 0.7))  # blur [m], floor
+FIRST_STARTS = ((4e-4, 0.1), (4e-3, 0.1), (4e-4, 0.7))  # blur [m], floor
+POOR_FIT = 0.3  # a symmetric section that leaves more than this may be hiding a leaning one
 LEAN_GAIN = 0.5  # a lean that halves the cost needs no vote
 LIKELY_LEAN = 0.02  # of the width: the standard deviation of a lean that went unnoticed
 EDGE = 5e-5  # [m] width given to a vertical wall
@@ -113,7 +114,7 @@ def fit_section(
     plain, cost = min((_solve(x, shear, depth, weight, each, noise, symmetric=True) for each in starts), key=lambda found: found[1])
     score, sigma, exchange = _lean_evidence(plain, x, shear, depth, weight, block)
     leaning = [start] if start.lean else []
-    if first or abs(score) > LEAN_SCORE:
+    if abs(score) > LEAN_SCORE or (first and _misfit(plain, x, shear, depth, weight) > POOR_FIT):
         width = max(start.width, plain.width)
         leaning += [plain, *(replace(plain, lean=side * width, width=width, blur=4e-4, floor=0.1) for side in (0.35, -0.35))]
     if leaning:
@@ -124,6 +125,14 @@ def fit_section(
             return best, min(abs(exchange) * sigma, 0.1 * best.width)
     allowed = LIKELY_LEAN * plain.width
     return plain, abs(exchange) / float(np.hypot(1 / max(sigma, 1e-9), 1 / allowed))
+
+
+def _misfit(
+    section: Section, x: Float[ndarray, "k"], shear: Float[ndarray, "k"], depth: Float[ndarray, "k"], weight: Float[ndarray, "k"]
+) -> float:
+    """rms of what the section leaves over the rms of the depth."""
+    left = weight @ (section.depth_at(x, shear) - depth) ** 2
+    return float(np.sqrt(left / max(float(weight @ depth**2), 1e-30)))
 
 
 def _lean_evidence(
