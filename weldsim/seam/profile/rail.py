@@ -10,6 +10,8 @@ from scipy.spatial import KDTree
 from weldsim.curves import arc_length, interpolate, tangents
 from weldsim.frames import unit
 
+SHARPEST = 1 / 0.20  # [1/m] the curvature with which a rail is carried on at most: an end is known from one side only
+
 
 @dataclass(frozen=True, eq=False)
 class Rail:
@@ -49,21 +51,32 @@ class Strip:
 
 
 def make_rail(points: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], step: float, extend: float = 0.0) -> Rail:
-    """A rail through a smooth polyline, resampled at `step` and lengthened by `extend` [m] along its end tangents.
+    """A rail through a smooth polyline, resampled at `step` and lengthened by `extend` [m] as its ends bend.
 
     Args:
         points: (k, 3) ordered [m].  normals: (k, 3) outward, roughly.
     """
     if extend > 0:
-        reach = max(2, min(len(points) - 1, round(0.012 / max(step, 1e-9))))
-        head, tail = unit(points[0] - points[reach]), unit(points[-1] - points[-1 - reach])
-        extra = np.arange(1, int(np.ceil(extend / step)) + 1)[:, None] * step
-        points = np.concatenate([(points[0] + extra * head)[::-1], points, points[-1] + extra * tail])
-        normals = np.concatenate([np.repeat(normals[:1], len(extra), 0), normals, np.repeat(normals[-1:], len(extra), 0)])
+        head, tail = _onward(points[::-1], step, extend)[::-1], _onward(points, step, extend)
+        points = np.concatenate([head, points, tail])
+        normals = np.concatenate([np.repeat(normals[:1], len(head), 0), normals, np.repeat(normals[-1:], len(tail), 0)])
     s = arc_length(points)
     at = np.arange(0.0, s[-1] + 1e-9, step)
     even = interpolate(s, points, at)
     return _with_axes(even, interpolate(s, normals, at), step)
+
+
+def _onward(points: Float[ndarray, "k 3"], step: float, extend: float) -> Float[ndarray, "j 3"]:
+    """Points that carry a polyline on past its last one by `extend` [m], with the direction and curvature of its end."""
+    s = arc_length(points)
+    s = s - s[-1]
+    reach = min(-s[0], 0.020)
+    marks = interpolate(s, points, np.array([-reach, -0.8 * reach, -0.2 * reach, 0.0]))
+    before, last = unit(marks[1] - marks[0]), unit(marks[3] - marks[2])
+    bend = (last - before) / (0.8 * reach)
+    bend = bend * min(1.0, SHARPEST / max(float(np.linalg.norm(bend)), 1e-9))
+    d = np.arange(1, int(np.ceil(extend / step)) + 1)[:, None] * step
+    return points[-1] + d * (last + 0.1 * reach * bend) + 0.5 * d**2 * bend
 
 
 def _with_axes(points: Float[ndarray, "m 3"], normals: Float[ndarray, "m 3"], step: float) -> Rail:
