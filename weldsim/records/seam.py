@@ -1,0 +1,161 @@
+"""Seams: found ones with what the finder has to say about them, and the known one of a workpiece."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from weldsim.records.checks import check_increasing, check_metres, check_unit, require, store
+
+Reference = Literal["opening", "root", "gap_mid"]
+Joint = Literal["groove", "butt", "lap", "fillet", "saddle"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Seam:
+    """A weld seam found in a cloud, ordered along travel, expressed in the robot base.
+
+    Attributes:
+        points_B: (n, 3) the centre line at `reference` [m].
+        s: (n,) arc length [m], from 0.
+        tangents_B: (n, 3) unit, along travel.
+        normals_B: (n, 3) unit, outward normal of the parent surface (for a groove, minus the inward bisector).
+        left_B, right_B: (n, 3) the two lips or toes [m], left as seen looking along travel with the normal up; or None.
+        sigma: (n,) standard deviation of the centre line across the seam [m], or None where the method gives none.
+        width: mean distance between the lips [m].
+        depth: mean depth of the root below the opening, as the sensor showed it [m]; None where not measured.
+        residual: rms distance of the data from the fitted cross-sections [m].
+        confidence: 0 to 1.
+        joint, reference: which kind of joint, and which line of it `points_B` follows.
+        closed: whether the last point joins the first.
+    """
+
+    points_B: Float[ndarray, "n 3"]
+    s: Float[ndarray, "n"]
+    tangents_B: Float[ndarray, "n 3"]
+    normals_B: Float[ndarray, "n 3"]
+    left_B: Float[ndarray, "n 3"] | None = None
+    right_B: Float[ndarray, "n 3"] | None = None
+    sigma: Float[ndarray, "n"] | None = None
+    width: float = 0.0
+    depth: float | None = None
+    residual: float = 0.0
+    confidence: float = 0.0
+    joint: Joint = "groove"
+    reference: Reference = "opening"
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        store(self, "points_B", self.points_B, shape=("n", 3))
+        n = len(self.points_B)
+        require(n >= 2, self, "points_B", f"{n} points; a seam needs two")
+        check_metres(self, "points_B", self.points_B)
+        store(self, "s", self.s, shape=(n,))
+        check_increasing(self, "s", self.s)
+        for name in ("tangents_B", "normals_B"):
+            store(self, name, getattr(self, name), shape=(n, 3))
+            check_unit(self, name, getattr(self, name))
+        for name in ("left_B", "right_B"):
+            if getattr(self, name) is not None:
+                store(self, name, getattr(self, name), shape=(n, 3))
+        if self.sigma is not None:
+            store(self, "sigma", self.sigma, shape=(n,))
+            require(bool((self.sigma >= 0).all()), self, "sigma", "negative standard deviation")
+        require(0.0 <= self.confidence <= 1.0, self, "confidence", f"{self.confidence} is outside 0 to 1")
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return float(self.s[-1] - self.s[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rejection:
+    """A candidate that looked like a seam and was refused, and why.
+
+    Attributes:
+        position_B: its middle [m].  length: its extent [m].  reason: one clause, with the figure and the limit.
+    """
+
+    position_B: tuple[float, float, float]
+    length: float
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Threshold:
+    """The detection threshold that was chosen from the cloud itself, and how much it matters.
+
+    Attributes:
+        name: what is compared with it.  value, unit: the threshold.  noise: the cloud's own noise in the same unit.
+        stability: {factor: greatest movement of the centre line [m] when the threshold is multiplied by factor};
+            infinity where the seam is then lost.
+    """
+
+    name: str
+    value: float
+    unit: str
+    noise: float
+    stability: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SeamFindings:
+    """What a seam finder returns: seams best first, and why the others were refused.
+
+    Attributes:
+        seams: best first; empty when there is none.
+        region: (n,) for each point of the cloud, 1 + index of the seam whose groove holds it, 0 for none.
+        rejected: candidates refused.
+        threshold: the threshold used.
+        method: "profile" or "thesis".
+    """
+
+    seams: tuple[Seam, ...]
+    region: Int[ndarray, "n"]
+    rejected: tuple[Rejection, ...] = ()
+    threshold: Threshold | None = None
+    method: str = "profile"
+
+    def __post_init__(self) -> None:
+        store(self, "region", self.region, shape=("n",), dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class KnownSeam:
+    """The true seam of a workpiece, in closed form and sampled; for `report` and tests alone.
+
+    Attributes:
+        opening_B: (n, 3) midpoint of the lips [m], at most 0.5 mm apart.
+        root_B: (n, 3) the bottom of the groove [m].
+        left_B, right_B: (n, 3) the lips [m], left as in `Seam`.
+        tangents_B: (n, 3) unit.  bisectors_B: (n, 3) unit, inward: the ideal wire axis.
+        s: (n,) arc length of the opening [m].
+        name: workpiece and branch.
+    """
+
+    opening_B: Float[ndarray, "n 3"]
+    root_B: Float[ndarray, "n 3"]
+    left_B: Float[ndarray, "n 3"]
+    right_B: Float[ndarray, "n 3"]
+    tangents_B: Float[ndarray, "n 3"]
+    bisectors_B: Float[ndarray, "n 3"]
+    s: Float[ndarray, "n"]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        store(self, "opening_B", self.opening_B, shape=("n", 3))
+        n = len(self.opening_B)
+        for name in ("root_B", "left_B", "right_B", "tangents_B", "bisectors_B"):
+            store(self, name, getattr(self, name), shape=(n, 3))
+        check_unit(self, "tangents_B", self.tangents_B)
+        check_unit(self, "bisectors_B", self.bisectors_B)
+        store(self, "s", self.s, shape=(n,))
+        check_increasing(self, "s", self.s)
+
+    @property
+    def length(self) -> float:
+        """Arc length of the opening [m]."""
+        return float(self.s[-1] - self.s[0])
