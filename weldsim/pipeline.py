@@ -1,7 +1,7 @@
 """The whole job, in order: scene -> sensor -> cloud -> seam -> path -> motion -> execution -> report.
 
-`plan` is the middle of it, for any cloud; `run` is all of it on the twin. Perception sees what the sensor delivers and
-nothing else: the known seam is handed to the report alone. Times are taken here and nowhere else.
+`look` is its beginning on the twin, `plan` its middle for any cloud, `finish` its end, `run` all three. Perception sees what
+the sensor delivers and nothing else: the known seam is handed to the report alone. Times are taken here and nowhere else.
 """
 
 import time
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from weldsim.sensor.base import Capture
 
 SensorName = Literal["d415", "exact"]
+Finder = Callable[[PointCloud], SeamFindings]
+"""A seam finder: a cloud in the robot base in, seams best first out. It may read nothing but the cloud."""
 Tell = Callable[[str, float | None], None]
 """Told the stage that begins, and while it runs the fraction done, 0 to 1, where that is known."""
 
@@ -56,6 +58,23 @@ class Clock:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sighting:
+    """A scene of the twin as its camera saw it, before anything is concluded from it.
+
+    Attributes:
+        world: the compiled scene.  captures: one a view.  cloud: all views in the base, as perception receives it.
+        seed, sensor: what it was seen with.  timing: seconds a stage.
+    """
+
+    world: "World"
+    captures: tuple["Capture", ...]
+    cloud: PointCloud
+    seed: int
+    sensor: SensorName
+    timing: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,9 +103,15 @@ class RunResult:
     report: WeldReport
 
 
-def plan(cloud: PointCloud, config: CellConfig | None = None, *, clock: Clock | None = None) -> PlanResult:
+def plan(
+    cloud: PointCloud, config: CellConfig | None = None, *, find: Finder | None = None, clock: Clock | None = None
+) -> PlanResult:
     """Seams of a cloud in the robot base, best first, and a torch path along each; none of either where there is no seam.
 
+    Args:
+        cloud: in B.  config: every stage's settings.
+        find: a seam finder of the caller's own, in place of the one that `config.seam` names.
+        clock: takes the times.
     Raises:
         CloudError: a cloud that cannot show a seam.  PathError: the path asked for does not fit a seam.
     """
@@ -95,7 +120,7 @@ def plan(cloud: PointCloud, config: CellConfig | None = None, *, clock: Clock | 
         cloud = prepare(cloud, config.cloud)
         check_plannable(cloud)
     with clock.stage("seam"):
-        findings = find_seams(cloud, config.seam)
+        findings = find_seams(cloud, config.seam) if find is None else find(cloud)
     with clock.stage("path"):
         paths = tuple(plan_path(seam, config.path) for seam in findings.seams)
     return PlanResult(cloud=cloud, findings=findings, paths=paths, timing=clock.seconds, config_digest=digest(config))
@@ -139,6 +164,36 @@ def scan(world: "World", config: CellConfig, seed: int = 0, sensor: SensorName =
     return tuple(captures)
 
 
+def look(
+    scene: "SceneConfig",
+    config: CellConfig | None = None,
+    *,
+    seed: int = 0,
+    sensor: SensorName = "d415",
+    world: "World | None" = None,
+    clock: Clock | None = None,
+) -> Sighting:
+    """The scene built and scanned from all its views, merged into one cloud in the robot base.
+
+    Args:
+        scene: what stands on the table.  config: everything else.
+        seed: of the camera's noise.  sensor: the D415 model, or exact depth.
+        world: `scene` already built, by whoever looks at it several times.  clock: takes the times.
+    Raises:
+        SceneError, UnreachableError, SensorError, CloudError: see the stages.
+    """
+    from weldsim.scene.world import build_world
+
+    config, clock = config or CellConfig(), clock or Clock()
+    with clock.stage("scene"):
+        world = build_world(scene) if world is None else world
+    with clock.stage("sensor"):
+        captures = scan(world, config, seed, sensor)
+    with clock.stage("cloud"):
+        cloud = merge([deproject(capture.frame) for capture in captures])
+    return Sighting(world=world, captures=captures, cloud=cloud, seed=seed, sensor=sensor, timing=dict(clock.seconds))
+
+
 def run(
     scene: "SceneConfig",
     config: CellConfig | None = None,
@@ -161,33 +216,53 @@ def run(
     Raises:
         WeldsimError: see the stages; finding no seam is a result, not an error.
     """
-    from weldsim.scene.world import build_world
-
     config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
-    with clock.stage("scene"):
-        world = build_world(scene)
-    with clock.stage("sensor"):
-        captures = scan(world, config, seed, sensor)
-    with clock.stage("cloud"):
-        cloud = merge([deproject(capture.frame) for capture in captures])
-    result = plan(cloud, config, clock=clock)
+    seen = look(scene, config, seed=seed, sensor=sensor, clock=clock)
+    result = plan(seen.cloud, config, clock=clock)
+    return finish(seen, result, config, number=number, near=near, video=video, clock=clock)
+
+
+def finish(
+    seen: Sighting,
+    result: PlanResult,
+    config: CellConfig,
+    *,
+    number: int | None = None,
+    near: Sequence[float] | None = None,
+    execute: bool = True,
+    video: "Path | None" = None,
+    clock: Clock | None = None,
+) -> RunResult:
+    """What was planned on a sighting, welded by the simulated arm and judged against the scene's known seams.
+
+    Args:
+        seen: where the cloud came from.  result: what was planned on `seen.cloud`.  config: as planned with.
+        number, near: which seam; see `pick`.
+        execute: whether the arm welds it; without, the plan alone is judged and motion and log are None.
+        video: where to write a film of the weld.  clock: takes the times.
+    Raises:
+        MotionError, ExecutionError: the arm cannot.  InputError: a seam number that there is not.
+    """
+    clock, world = clock or Clock(), seen.world
     welded = pick(result.findings, number, near) if result.paths else 0
-    motion, log = _weld(world, result.paths[welded], config, clock, video) if result.paths else (None, None)
+    motion, log = None, None
+    if execute and result.paths:
+        motion, log = _weld(world, result.paths[welded], config, clock, video)
     with clock.stage("report"):
         report = weld_report(
             result.findings,
             tuple(replace(path, X_BT=wire_tip(path.X_BT, config.path)) for path in result.paths),
-            scene=scene.name,
+            scene=world.config.name,
             log=None if log is None else replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
             known=tuple(leaned(seam, result.paths[welded], config.path) if result.paths else seam for seam in world.known_seams),
-            true_region=_true_region(captures, cloud, result.cloud),
+            true_region=true_region(seen.captures, seen.cloud, result.cloud),
             welded=welded,
-            seed=seed,
+            seed=seen.seed,
             config_digest=result.config_digest,
             config=config.report,
         )
     report = replace(report, timing=dict(clock.seconds))
-    return RunResult(world=world, captures=captures, plan=result, welded=welded, motion=motion, log=log, report=report)
+    return RunResult(world=world, captures=seen.captures, plan=result, welded=welded, motion=motion, log=log, report=report)
 
 
 def _weld(
@@ -213,7 +288,7 @@ def _weld(
     return motion, log
 
 
-def _true_region(captures: tuple["Capture", ...], cloud: PointCloud, kept: PointCloud) -> Bool[ndarray, "n"] | None:
+def true_region(captures: tuple["Capture", ...], cloud: PointCloud, kept: PointCloud) -> Bool[ndarray, "n"] | None:
     """For each point kept, whether it lies in a groove; None where points were merged and cannot be told apart."""
     from weldsim.sensor.base import Label
 
