@@ -29,6 +29,15 @@ class Label(IntEnum):
     ROOM = 6
 
 
+class Finish(IntEnum):
+    """What a surface looks like to a camera. The names in lower case are those of a scene's `material.finish`."""
+
+    MATTE = 0
+    MILL_SCALE = 1
+    GROUND = 2
+    BLACK = 3
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class View:
     """One exposure asked of a sensor.
@@ -55,16 +64,22 @@ class Truth:
     Attributes:
         depth: exact z-depth at each pixel's centre [m], NaN where nothing is.
         labels: a `Label` a pixel.
+        finishes: a `Finish` a pixel, or None where every surface is matte.
     """
 
     depth: Float32[ndarray, "h w"]
     labels: UInt8[ndarray, "h w"]
+    finishes: UInt8[ndarray, "h w"] | None = None
 
     def __post_init__(self) -> None:
-        if self.depth.shape != self.labels.shape:
-            raise RecordError(f"Truth.labels: shape {self.labels.shape}, expected {self.depth.shape}", field="labels")
+        for name in ("labels", "finishes"):
+            image = getattr(self, name)
+            if image is None:
+                continue
+            if image.shape != self.depth.shape:
+                raise RecordError(f"Truth.{name}: shape {image.shape}, expected {self.depth.shape}", field=name)
+            object.__setattr__(self, name, read_only(np.asarray(image, np.uint8)))
         object.__setattr__(self, "depth", read_only(np.asarray(self.depth, np.float32)))
-        object.__setattr__(self, "labels", read_only(np.asarray(self.labels, np.uint8)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,3 +108,6 @@ class DepthSensor(ABC):
         Raises:
             SensorError: the sensor cannot deliver.
         """
+
+    def close(self) -> None:  # noqa: B027 - most sensors hold nothing
+        """Frees what the sensor holds outside Python; closing twice is allowed."""

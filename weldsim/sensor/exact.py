@@ -4,14 +4,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float32, Int32, UInt8
 from numpy import ndarray
 
 from weldsim.errors import SensorError
 from weldsim.frames import Transform
 from weldsim.records import CameraIntrinsics, DepthFrame
 from weldsim.sensor.backend import Backend
-from weldsim.sensor.base import Capture, DepthSensor, Label, Truth, View
+from weldsim.sensor.base import Capture, DepthSensor, Finish, Label, Truth, View
 from weldsim.sensor.renderer import make_renderer
 
 if TYPE_CHECKING:
@@ -28,22 +28,36 @@ class TwinScene:
         model, data: MuJoCo's, as they are at the moment of each capture.
         X_WB: the robot base in the world.
         labels: (ngeom,) a `Label` for each geom.
+        finishes: (ngeom,) a `Finish` for each geom, or None where every surface is matte.
     """
 
     model: "mujoco.MjModel"
     data: "mujoco.MjData"
     X_WB: Transform
     labels: UInt8[ndarray, "ngeom"]
+    finishes: UInt8[ndarray, "ngeom"] | None = None
 
     def __post_init__(self) -> None:
-        if self.labels.shape != (self.model.ngeom,):
-            raise SensorError(f"scene labels: {self.labels.shape} for {self.model.ngeom} geoms", limit=self.model.ngeom)
+        for name, values in (("labels", self.labels), ("finishes", self.finishes)):
+            if values is not None and values.shape != (self.model.ngeom,):
+                raise SensorError(f"scene {name}: {values.shape} for {self.model.ngeom} geoms", limit=self.model.ngeom)
+
+    def truth(self, depth: Float32[ndarray, "h w"], geom: Int32[ndarray, "h w"]) -> Truth:
+        """What an exact image shows: depth [m], and the label and finish of each pixel's geom (-1 for a miss)."""
+        labels = np.append(self.labels, np.uint8(Label.NONE))[geom]  # geom -1 takes the last
+        finishes = None if self.finishes is None else np.append(self.finishes, np.uint8(Finish.MATTE))[geom]
+        return Truth(depth=depth, labels=labels, finishes=finishes)
 
 
 def twin_scene(world: "World", data: "mujoco.MjData") -> TwinScene:
-    """What the sensors of the twin look at: a world at the state `data`, its labels by geom."""
+    """What the sensors of the twin look at: a world at the state `data`, its labels by geom.
+
+    The part has the finish that the scene gives it; all else counts as matte.
+    """
     labels = np.array([Label[world.labels[geom].upper()] for geom in range(world.model.ngeom)], np.uint8)
-    return TwinScene(model=world.model, data=data, X_WB=world.X_WB, labels=labels)
+    finish = Finish[world.config.material.finish.upper()]
+    finishes = np.where(np.isin(labels, (Label.PART, Label.GROOVE)), finish, Finish.MATTE).astype(np.uint8)
+    return TwinScene(model=world.model, data=data, X_WB=world.X_WB, labels=labels, finishes=finishes if finish else None)
 
 
 @final
@@ -73,7 +87,6 @@ class ExactSensor(DepthSensor):
 
     def capture(self, view: View) -> Capture:
         image = self._renderer.render(self._scene.data, self._scene.X_WB @ view.X_BC, self._intrinsics, colour=self._colour)
-        labels = np.append(self._scene.labels, np.uint8(Label.NONE))[image.geom]  # geom -1 takes the last
         frame = DepthFrame(
             depth=image.depth,
             intrinsics=self._intrinsics,
@@ -82,8 +95,7 @@ class ExactSensor(DepthSensor):
             t=view.t,
             source=f"exact ({self.backend})",
         )
-        return Capture(frame=frame, truth=Truth(depth=image.depth, labels=labels))
+        return Capture(frame=frame, truth=self._scene.truth(image.depth, image.geom))
 
     def close(self) -> None:
-        """Frees the renderer."""
         self._renderer.close()

@@ -7,7 +7,7 @@ import numpy as np
 from weldsim.errors import SensorError
 from weldsim.frames import Transform
 from weldsim.records import CameraIntrinsics, DepthFrame
-from weldsim.sensor.base import Capture, DepthSensor, Label, View
+from weldsim.sensor.base import Capture, DepthSensor, View
 from weldsim.sensor.d415 import D415Config, d415
 
 SAME_POSITION, SAME_ROTATION = 1e-4, 1e-3  # [m], matrix entries: views closer than this share their lasting noise
@@ -35,14 +35,13 @@ class D415Fast(DepthSensor):
             raise SensorError(
                 "the parametric D415 needs exact depth to start from, and the sensor inside gives none", sensor="d415"
             )
-        labels = inner.truth.labels
         depth = d415(
             np.asarray(inner.truth.depth),
             self.intrinsics,
             self._config,
             seed=[self._seed, *view_key(view.X_BC)],
             exposure=view.exposure,
-            part=(labels == Label.PART) | (labels == Label.GROOVE),
+            finishes=None if inner.truth.finishes is None else np.asarray(inner.truth.finishes),
         )
         frame = DepthFrame(
             depth=depth,
@@ -53,6 +52,9 @@ class D415Fast(DepthSensor):
             source=f"d415 model on {inner.frame.source}",
         )
         return Capture(frame=frame, truth=inner.truth)
+
+    def close(self) -> None:
+        self._exact.close()
 
 
 def view_key(X_BC: Transform) -> list[int]:

@@ -14,7 +14,8 @@ from tests.depth_scenes import FLAT, fillet, points_in_part, profile_depth, v_gr
 from weldsim.errors import ConfigError, RecordError
 from weldsim.mounts import D415_640X480
 from weldsim.records import CameraIntrinsics
-from weldsim.sensor.d415 import D415_1280X720, D415Config, d415
+from weldsim.sensor.base import Finish
+from weldsim.sensor.d415 import COARSENESS, D415_1280X720, DROPOUT, D415Config, d415, unit_intrinsics
 
 SEEDS = range(4)
 FINE = D415Config(depth_unit=1e-4)  # the model's own figures, not those of the millimetre steps
@@ -214,16 +215,55 @@ def test_units_and_views_differ_and_repeat() -> None:
 
 def test_dark_and_shiny_parts_have_holes_and_the_rest_has_not() -> None:
     exact = profile_depth(D415_640X480, FLAT, 0.45)
-    part = np.zeros(exact.shape, bool)
-    part[:, 320:] = True
-    holes = [
-        np.isnan(d415(exact, D415_640X480, D415Config(material=m), seed=[1], part=part))[:, 320:].mean()
-        for m in ("matte", "mill_scale", "ground", "black")
-    ]
-    assert holes == sorted(holes)
+    part = np.arange(640)[None, :] >= 320 + np.zeros((480, 1), int)
+    holes, sigma = [], []
+    for finish in Finish:
+        finishes = np.where(part, finish, Finish.MATTE).astype(np.uint8)
+        depth = d415(exact, D415_640X480, FINE, seed=[1], finishes=finishes)
+        assert np.isfinite(depth[:, 130:320]).all()
+        holes.append(np.isnan(depth)[:, 320:].mean())
+        sigma.append(np.nanstd((depth - exact)[:, 320:]) / np.nanstd((depth - exact)[:, 130:320]))
     assert holes[0] == 0 < holes[1]
-    black = d415(exact, D415_640X480, D415Config(material="black"), seed=[1], part=part)
-    assert np.isfinite(black[:, 130:320]).all()
+    assert holes == sorted(holes)
+    assert holes == pytest.approx([DROPOUT[finish] for finish in Finish], abs=0.04)
+    assert sigma == pytest.approx([COARSENESS[finish] for finish in Finish], rel=0.1)
+
+
+def test_matte_everywhere_is_the_default() -> None:
+    exact = profile_depth(D415_640X480, v_groove(0.014, 0.008), 0.4)
+    plain = d415(exact, D415_640X480, D415Config(), seed=[4])
+    said = d415(exact, D415_640X480, D415Config(), seed=[4], finishes=np.zeros(exact.shape, np.uint8))
+    assert plain.tobytes() == said.tobytes()
+
+
+def test_units_differ_within_their_ranges_and_repeat() -> None:
+    units = [D415Config.randomised(seed) for seed in range(200)]
+    assert units == [D415Config.randomised(seed) for seed in range(200)]
+    for name, low, high in (
+        ("focal_scale", 0.985, 1.015),
+        ("baseline", 0.0547, 0.0553),
+        ("window", 9, 13),
+        ("disparity_sigma", 0.05, 0.10),
+        ("pixel_locking", 0.0, 0.12),
+        ("temporal_fraction", 0.1, 0.7),
+    ):
+        values = np.array([getattr(unit, name) for unit in units])
+        assert low <= values.min() < values.max() <= high
+        assert values.max() - values.min() > 0.9 * (high - low)
+    base = D415Config(offset_sigma=2e-3, depth_unit=1e-4)
+    assert {(u.offset_sigma, u.depth_unit) for u in (D415Config.randomised(seed, base) for seed in range(5))} == {(2e-3, 1e-4)}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_unit_sees_planes_where_they_are(seed: int) -> None:
+    """Focal length and baseline belong to the unit and it knows them: no scale error, and the noise law is its own."""
+    unit = D415Config.randomised(seed, SMOOTH)
+    intrinsics = unit_intrinsics(D415_640X480, unit)
+    exact = profile_depth(intrinsics, FLAT, 0.45, tilt=0.1)
+    error = middle(d415(exact, intrinsics, unit, seed=[seed]) - exact)
+    assert abs(np.nanmean(error)) < 0.2e-3
+    law = 0.45**2 * np.hypot(unit.disparity_sigma, unit.pixel_locking / np.sqrt(2)) / (intrinsics.fx * unit.baseline)
+    assert np.nanstd(error) == pytest.approx(law, rel=0.2)
 
 
 def test_an_empty_view_gives_an_empty_image() -> None:
