@@ -129,6 +129,15 @@ def groove_cloud(
     return GrooveCloud(cloud, seam, labels.ravel()[pixel].astype(np.int64))
 
 
+def two_grooves(seed: int = 0) -> PointCloud:
+    """A level plate with two V-grooves 14 mm wide along x, one 280 mm long, the other 110 mm, seen from above."""
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(-0.14, 0.1401, 0.0008), np.arange(-0.11, 0.1101, 0.0008))
+    v = np.maximum(0.0, 1 - np.abs(y - 0.05) / 0.007) + np.maximum(0.0, 1 - np.abs(y + 0.05) / 0.007) * (np.abs(x) < 0.055)
+    points = np.stack([x, y - 0.5, 0.02 - 0.008 * v + 1e-4 * rng.normal(size=x.shape)], axis=-1).reshape(-1, 3)
+    return PointCloud(points=points, viewpoints=np.array([[0.0, -0.5, 0.45]]))
+
+
 def d415_depth(z: Float[ndarray, "h w"], fx: float, rng: np.random.Generator) -> Float[ndarray, "h w"]:
     """Depth [m] as an active-stereo camera would report it: averaged over the support window, correlated noise that
     doubles where disparity varies within the window, 1/32 px and 1 mm steps, NaN at depth steps."""

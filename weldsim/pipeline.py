@@ -5,7 +5,7 @@ the sensor delivers and nothing else: the known seam is handed to the report alo
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
@@ -20,9 +20,9 @@ from weldsim.cloud.filters import prepare
 from weldsim.cloud.merge import merge
 from weldsim.config import CellConfig, digest
 from weldsim.curves import project
-from weldsim.errors import InputError
+from weldsim.errors import InputError, PathError
 from weldsim.path.asked import leaned, wire_tip
-from weldsim.path.plan import plan_path
+from weldsim.path.plan import plan_paths
 from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
 from weldsim.report.weld import weld_report
 from weldsim.seam.find import find_seams
@@ -79,12 +79,13 @@ class Sighting:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanResult:
-    """What was planned from a cloud. Attributes: cloud, as the seam finder saw it; findings; paths, one for each seam;
-    timing, seconds a stage; config_digest."""
+    """What was planned from a cloud. Attributes: cloud, as the seam finder saw it; findings; paths, one for each seam, None
+    where none can be laid; refused, why, by the seam's index; timing, seconds a stage; config_digest."""
 
     cloud: PointCloud
     findings: SeamFindings
-    paths: tuple[TorchPath, ...]
+    paths: tuple[TorchPath | None, ...]
+    refused: Mapping[int, PathError] = field(default_factory=dict)
     timing: dict[str, float]
     config_digest: str
 
@@ -108,12 +109,14 @@ def plan(
 ) -> PlanResult:
     """Seams of a cloud in the robot base, best first, and a torch path along each; none of either where there is no seam.
 
+    A seam along which no path can be laid is named in `refused` and does not keep the others from being planned.
+
     Args:
         cloud: in B.  config: every stage's settings.
         find: a seam finder of the caller's own, in place of the one that `config.seam` names.
         clock: takes the times.
     Raises:
-        CloudError: a cloud that cannot show a seam.  PathError: the path asked for does not fit a seam.
+        CloudError: a cloud that cannot show a seam.  PathError: the path asked for fits none of the seams.
     """
     config, clock = config or CellConfig(), clock or Clock()
     with clock.stage("cloud"):
@@ -122,8 +125,10 @@ def plan(
     with clock.stage("seam"):
         findings = find_seams(cloud, config.seam) if find is None else find(cloud)
     with clock.stage("path"):
-        paths = tuple(plan_path(seam, config.path) for seam in findings.seams)
-    return PlanResult(cloud=cloud, findings=findings, paths=paths, timing=clock.seconds, config_digest=digest(config))
+        paths, refused = plan_paths(findings.seams, config.path)
+    return PlanResult(
+        cloud=cloud, findings=findings, paths=paths, refused=refused, timing=clock.seconds, config_digest=digest(config)
+    )
 
 
 def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float] | None = None) -> int:
@@ -242,27 +247,48 @@ def finish(
         video: where to write a film of the weld.  clock: takes the times.
     Raises:
         MotionError, ExecutionError: the arm cannot.  InputError: a seam number that there is not.
+        PathError: the seam that is meant has no path.
     """
     clock, world = clock or Clock(), seen.world
-    welded = pick(result.findings, number, near) if result.paths else 0
-    motion, log = None, None
-    if execute and result.paths:
-        motion, log = _weld(world, result.paths[welded], config, clock, video)
+    welded, path = _to_weld(result, number, near)
+    motion, log = _weld(world, path, config, clock, video) if execute and path is not None else (None, None)
     with clock.stage("report"):
         report = weld_report(
             result.findings,
-            tuple(replace(path, X_BT=wire_tip(path.X_BT, config.path)) for path in result.paths),
+            tuple(None if each is None else replace(each, X_BT=wire_tip(each.X_BT, config.path)) for each in result.paths),
             scene=world.config.name,
             log=None if log is None else replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
-            known=tuple(leaned(seam, result.paths[welded], config.path) if result.paths else seam for seam in world.known_seams),
+            known=tuple(seam if path is None else leaned(seam, path, config.path) for seam in world.known_seams),
             true_region=true_region(seen.captures, seen.cloud, result.cloud),
             welded=welded,
+            unplanned=unplanned(result),
             seed=seen.seed,
             config_digest=result.config_digest,
             config=config.report,
         )
     report = replace(report, timing=dict(clock.seconds))
     return RunResult(world=world, captures=seen.captures, plan=result, welded=welded, motion=motion, log=log, report=report)
+
+
+def unplanned(result: PlanResult) -> tuple[str, ...]:
+    """A clause for each seam that has no path: its number from 1 and why."""
+    return tuple(f"seam {index + 1} has no path: {error}" for index, error in result.refused.items())
+
+
+def _to_weld(result: PlanResult, number: int | None, near: Sequence[float] | None) -> tuple[int, TorchPath | None]:
+    """Index and path of the seam that is meant, by default the best that has a path; (0, None) where there is no seam.
+
+    Raises:
+        InputError: a number that no seam has.  PathError: the seam that is meant has no path.
+    """
+    if not result.paths:
+        return 0, None
+    if number is None and near is None:
+        return next((index, path) for index, path in enumerate(result.paths) if path is not None)
+    index = pick(result.findings, number, near)
+    if index in result.refused:
+        raise PathError(f"seam {index + 1}: {result.refused[index]}", **result.refused[index].data)
+    return index, result.paths[index]
 
 
 def _weld(

@@ -70,7 +70,8 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     resolved = {"cell": to_json(config), "scene": to_json(scene), "seed": seed, "sensor": sensor}
     _write_json(folder / "config.json", resolved)
     source = {"scene": scene.name, "seed": seed, "sensor": sensor, "points": len(plan.cloud), "method": plan.findings.method}
-    document = path_document(plan.findings.seams, plan.paths, report.timing, source, plan.config_digest)
+    reasons = {index: str(error) for index, error in plan.refused.items()}
+    document = path_document(plan.findings.seams, plan.paths, report.timing, source, plan.config_digest, refused=reasons)
     write_path_json(folder / "path.json", document)
     write_path_csv(folder / "path.csv", document)
     write_cloud(folder / "cloud.ply", plan.cloud)

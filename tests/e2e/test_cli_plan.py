@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.clouds import groove_cloud
+from tests.clouds import groove_cloud, two_grooves
 from weldsim.cli import main
 from weldsim.cloud.depth_output import write_depth_frame
 from weldsim.cloud.files import read_cloud, write_cloud
@@ -75,6 +75,28 @@ def test_path_files_hold_the_seam_in_the_base(weldsim, scan, tmp_path):
     rows = np.loadtxt(tmp_path / "path.csv", delimiter=",", comments=["#", "seam,"], usecols=range(1, 8))
     np.testing.assert_allclose(rows[:, 1:4], tip, atol=2e-9)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["path.csv", "path.json"]
+
+
+def test_seams_without_a_path_are_named_and_the_others_planned(weldsim, tmp_path):
+    write_cloud(tmp_path / "two.ply", two_grooves())
+    trims = ("--set", "path.start_trim=60 mm", "--set", "path.end_trim=60 mm")
+    done = weldsim("plan", "two.ply", *trims, "--out", "path.json", "--csv", "path.csv", "--report", "report.html")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "seam 2 has no path: trims of 60 and 60 mm leave" in done.stdout
+    document = read_path_json(tmp_path / "path.json")
+    assert [seam["id"] for seam in document["seams"]] == ["seam-1"]
+    (refused,) = document["refused"]
+    assert refused["id"] == "seam-2"
+    assert 0.1 < refused["length"] < 0.12
+    assert "mm leave" in refused["reason"]
+    assert "seam 2 has no path" in (tmp_path / "report.html").read_text()
+    answer = json.loads(weldsim("plan", "two.ply", *trims, "--json").stdout)
+    assert answer["refused"] == document["refused"]
+    asked = weldsim("plan", "two.ply", *trims, "--seam", 2, "--out", "second.json")
+    assert (asked.returncode, asked.stdout) == (1, "")
+    assert asked.stderr.startswith("weldsim: two.ply: seam 2: trims")
+    assert asked.stderr.count("\n") == 1
+    assert not (tmp_path / "second.json").exists()
 
 
 def test_the_same_inputs_give_the_same_bytes_in_two_processes(weldsim, scan, tmp_path):

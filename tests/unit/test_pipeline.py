@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.clouds import groove_cloud
+from tests.clouds import groove_cloud, two_grooves
 from weldsim.config import load_config
 from weldsim.curves import project
 from weldsim.errors import CloudError, InputError, PathError
-from weldsim.pipeline import Clock, pick, plan
+from weldsim.pipeline import Clock, pick, plan, unplanned
 from weldsim.records import PointCloud, Seam, SeamFindings
 
 
@@ -51,6 +51,20 @@ def test_what_cannot_be_planned_is_refused():
     made = groove_cloud(np.random.default_rng(1), noise="iid", sigma=0.0002)
     with pytest.raises(PathError, match="trims"):
         plan(made.cloud, load_config(overrides=["path.start_trim=300 mm"]))
+
+
+def test_one_seam_that_cannot_be_planned_does_not_keep_the_others():
+    cloud = two_grooves()
+    assert [seam.length > 0.2 for seam in plan(cloud).findings.seams] == [True, False]
+    trims = ["path.start_trim=60 mm", "path.end_trim=60 mm"]
+    result = plan(cloud, load_config(overrides=trims))
+    assert len(result.findings.seams) == len(result.paths) == 2
+    assert result.paths[0] is not None
+    assert result.paths[1] is None
+    assert list(result.refused) == [1]
+    assert "seam 2 has no path: trims of 60 and 60 mm leave" in unplanned(result)[0]
+    with pytest.raises(PathError, match=r"no path along any of 2 seams: seam 1: trims .*; seam 2: trims"):
+        plan(cloud, load_config(overrides=[*trims[:1], "path.end_trim=250 mm"]))
 
 
 def test_the_seam_that_is_meant():

@@ -11,7 +11,7 @@ from weldsim import units
 from weldsim.cli.options import ConfigOptions, Method, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, nearest_folder
 from weldsim.cli.show import Tell, progress, table, times
-from weldsim.errors import CloudError, InputError, NoSeamError
+from weldsim.errors import CloudError, InputError, NoSeamError, PathError
 
 if TYPE_CHECKING:
     from weldsim.config import CellConfig
@@ -122,8 +122,8 @@ class Plan(ConfigOptions):
             cloud = self._read()
         try:
             return pipeline.plan(cloud, config, clock=clock), clock
-        except CloudError as error:
-            raise CloudError(f"{self.cloud}: {error}", **error.data) from None
+        except (CloudError, PathError) as error:
+            raise type(error)(f"{self.cloud}: {error}", **error.data) from None
 
     def _read(self) -> "PointCloud":
         """The cloud in the file. Raises CloudFileError, CloudError, ConfigError."""
@@ -146,9 +146,11 @@ class Plan(ConfigOptions):
         if not everything or (self.seam is None and self.near is None):
             return result, everything
         index = pick(findings, self.seam, self.near)
+        if index in result.refused:
+            raise PathError(f"{self.cloud}: seam {index + 1}: {result.refused[index]}", **result.refused[index].data)
         region = np.where(findings.region == index + 1, 1, 0)
         findings = replace(findings, seams=(findings.seams[index],), region=region)
-        return replace(result, findings=findings, paths=(result.paths[index],)), (index + 1,)
+        return replace(result, findings=findings, paths=(result.paths[index],), refused={}), (index + 1,)
 
     def _document(self, chosen: "PlanResult", numbers: tuple[int, ...], clock: "Clock") -> dict[str, Any]:
         from weldsim.path.files import path_document
@@ -156,7 +158,13 @@ class Plan(ConfigOptions):
         viewpoints = chosen.cloud.viewpoints.tolist()
         source = {"file": self.cloud.name, "points": len(chosen.cloud), "viewpoints": viewpoints, "method": chosen.findings.method}
         return path_document(
-            chosen.findings.seams, chosen.paths, clock.seconds, source, chosen.config_digest, numbers=numbers or None
+            chosen.findings.seams,
+            chosen.paths,
+            clock.seconds,
+            source,
+            chosen.config_digest,
+            numbers=numbers or None,
+            refused={index: str(error) for index, error in chosen.refused.items()},
         )
 
     def _write(self, document: dict[str, Any]) -> None:
@@ -168,6 +176,7 @@ class Plan(ConfigOptions):
             write_path_csv(self.csv, document)
 
     def _write_report(self, page: Path, picture: Path, chosen: "PlanResult", clock: "Clock", config: "CellConfig") -> None:
+        from weldsim.pipeline import unplanned
         from weldsim.report.html import write_html
         from weldsim.report.png import write_png
         from weldsim.report.weld import weld_report
@@ -176,6 +185,7 @@ class Plan(ConfigOptions):
             chosen.findings,
             chosen.paths,
             scene=self.cloud.name,
+            unplanned=unplanned(chosen),
             timing=dict(clock.seconds),
             config_digest=chosen.config_digest,
             config=config.report,
@@ -198,6 +208,8 @@ class Plan(ConfigOptions):
     def _print(
         self, chosen: "PlanResult", numbers: tuple[int, ...], result: "PlanResult", clock: "Clock", page: Path | None
     ) -> None:
+        from weldsim.pipeline import unplanned
+
         found, method = len(result.findings.seams), chosen.findings.method
         print(f"{self.cloud.name}: {len(result.cloud)} points, {found} seam{'' if found == 1 else 's'}, method {method}")
         rows = []
@@ -212,10 +224,12 @@ class Plan(ConfigOptions):
                     f"{seam.confidence:.2f}" if seam.confidence > 0 else "-",
                     sigma,
                     seam.reference,
-                    str(len(path.s)),
+                    "-" if path is None else str(len(path.s)),
                 ]
             )
         print(table(rows, ("seam", "length", "width", "depth", "confidence", "sigma", "reference", "poses")))
+        for clause in unplanned(chosen):
+            print(f"  {clause}")
         print(times(clock.seconds))
         for path in (self.out, self.csv, page):
             if path is not None:

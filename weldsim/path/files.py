@@ -8,6 +8,7 @@ alone, so `path_text(document, timing=False)` is the same bytes for the same inp
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,32 +30,41 @@ QUATERNION_TOLERANCE = 1e-6
 
 def path_document(
     seams: tuple[Seam, ...],
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     timing: dict[str, float],
     source: dict[str, Any],
     config_digest: str,
     *,
     numbers: tuple[int, ...] | None = None,
+    refused: Mapping[int, str] | None = None,
 ) -> dict[str, Any]:
     """The `weldsim.path/1` document of seams and the torch paths along them, as plain lists and numbers.
 
     Args:
-        seams: best first.  paths: one for each seam, in the same order.
+        seams: best first.  paths: one for each seam, in the same order, None where it has none.
         timing: seconds a stage, kept under the one key `timing`.
         source: what was planned from (file name, points, viewpoint); kept under `input`.
         config_digest: of the resolved config.
         numbers: of the seams among all that were found; 1, 2, ... by default.
+        refused: why a seam has no path, by its place in `seams`; kept under `refused` with its id and length.
     Raises:
         InputError: seams and paths that do not pair up.
     """
     if len(seams) != len(paths):
         raise InputError(f"path document: {len(seams)} seams and {len(paths)} torch paths; each seam needs one", seams=len(seams))
     named = numbers or range(1, len(seams) + 1)
+    entries = list(zip(named, seams, paths, strict=True))
+    reasons = refused or {}
     return {
         "schema": SCHEMA,
         "frame": "base",
         "units": {"length": "m", "angle": "rad"},
-        "seams": [_seam_entry(*entry) for entry in zip(named, seams, paths, strict=True)],
+        "seams": [_seam_entry(number, seam, path) for number, seam, path in entries if path is not None],
+        "refused": [
+            {"id": f"seam-{number}", "length": round(seam.length, DECIMALS), "reason": reasons.get(i, "no path")}
+            for i, (number, seam, path) in enumerate(entries)
+            if path is None
+        ],
         "timing": {stage: round(float(seconds), 6) for stage, seconds in timing.items()},
         "input": source,
         "config_digest": config_digest,

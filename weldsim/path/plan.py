@@ -50,6 +50,30 @@ def plan_path(seam: Seam, config: PathConfig | None = None) -> TorchPath:
     )
 
 
+def plan_paths(
+    seams: tuple[Seam, ...], config: PathConfig | None = None
+) -> tuple[tuple[TorchPath | None, ...], dict[int, PathError]]:
+    """The path along each seam, None where none can be laid, and why not, by the seam's index.
+
+    Raises:
+        PathError: there are seams and none of them allows a path.
+    """
+    paths: list[TorchPath | None] = []
+    refused: dict[int, PathError] = {}
+    for index, seam in enumerate(seams):
+        try:
+            paths.append(plan_path(seam, config))
+        except PathError as error:
+            paths.append(None)
+            refused[index] = error
+    if len(refused) < max(len(seams), 1):
+        return tuple(paths), refused
+    if len(refused) == 1:
+        raise refused[0]
+    listed = "; ".join(f"seam {index + 1}: {error}" for index, error in refused.items())
+    raise PathError(f"no path along any of {len(seams)} seams: {listed}", **refused[0].data)
+
+
 def lean(work_angle: float, travel_angle: float) -> Float[ndarray, "3 3"]:
     """R from the leaned torch to the upright one: the work angle about travel (x), then the travel angle about the new y."""
     across = matrix_from_rotation_vector(np.array([work_angle, 0.0, 0.0]))
@@ -64,8 +88,9 @@ def _trimmed(seam: Seam, config: PathConfig) -> tuple[Float[ndarray, "n 3"], Flo
     s = arc_length(points)
     start, end = config.start_trim, float(s[-1]) - config.end_trim
     if end - start < SHORTEST:
+        left = max(end - start, 0.0)
         raise PathError(
-            f"trims of {1e3 * config.start_trim:g} and {1e3 * config.end_trim:g} mm leave {1e3 * (end - start):.1f} mm of a seam"
+            f"trims of {1e3 * config.start_trim:g} and {1e3 * config.end_trim:g} mm leave {1e3 * left:.1f} mm of a seam"
             f" {1e3 * s[-1]:.1f} mm long (least {1e3 * SHORTEST:g} mm)",
             length=float(s[-1]),
             limit=SHORTEST,

@@ -40,6 +40,7 @@ class WeldReport:
         speed_error_max, speed_error_p95: relative, on the weld.
         iou: overlap of the groove region found with the true one.
         phantom_seams: seams found that are no seam.
+        unplanned: seams found along which no path can be laid, a clause each.
         timing: seconds a stage.  seed, config_digest, versions: what it ran with.
     """
 
@@ -56,6 +57,7 @@ class WeldReport:
     iou: float | None = None
     phantom_seams: int | None = None
     sigma_coverage: tuple[float, float] | None = None
+    unplanned: tuple[str, ...] = ()
     timing: dict[str, float] = field(default_factory=dict)
     seed: int = 0
     config_digest: str = ""

@@ -24,7 +24,7 @@ LINE_LIMIT = 3000  # samples drawn of one line
 def scene(
     cloud: PointCloud,
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     log: ExecutionLog | None,
     known: tuple[KnownSeam, ...],
 ) -> Figure:
@@ -44,7 +44,7 @@ def scene(
         sides = [side for side in (seam.left_B, seam.right_B) if side is not None]
         data += [_line("lips", side, LIPS, 4, legend=i == k == 0) for k, side in enumerate(sides)]
         data.append(_line("centre line", seam.points_B, CENTRE, 3, legend=i == 0))
-    for i, path in enumerate(paths):
+    for i, path in enumerate(path for path in paths if path is not None):
         data.append(_line("torch path", path.X_BT.p[path.weld], SEAM, 7, legend=i == 0))
         wires = np.full((len(torch_axes(path)), 3, 3), np.nan)
         wires[:, :2] = torch_axes(path)

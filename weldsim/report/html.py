@@ -52,7 +52,7 @@ def write_html(
     report: WeldReport,
     cloud: PointCloud,
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     *,
     log: ExecutionLog | None = None,
     known: tuple[KnownSeam, ...] = (),
@@ -96,7 +96,7 @@ def _plots(
     drawn: list[figures.Figure],
     cloud: PointCloud,
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     log: ExecutionLog | None,
     known: tuple[KnownSeam, ...],
     welded: int,
@@ -114,8 +114,9 @@ def _plots(
         out.append(_figure(drawn, "Mean cross-section", figures.section(cross_section(cloud, seam))))
         if seam.sigma is not None or seam.left_B is not None:
             out.append(_figure(drawn, "Standard deviation and width along the seam", figures.uncertainty(seam)))
-    if log is not None and welded < len(paths):
-        speed = figures.torch_speed(log, paths[welded], config)
+    path = paths[welded] if welded < len(paths) else None
+    if log is not None and path is not None:
+        speed = figures.torch_speed(log, path, config)
         if speed is not None:
             out.append(_figure(drawn, "Torch speed", speed))
         out.append(_figure(drawn, "Joint angles", figures.joints(log, "q", joint_names)))
@@ -136,6 +137,7 @@ def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) ->
     word, why = verdict(report, len(findings.seams), config)
     look = "bad" if word == "FAILED" else "good" if word == "PASSED" else "plain"
     listed = "" if report.passed else "".join(f"<li>{escape(reason)}</li>" for reason in report.reasons)
+    listed += "".join(f"<li>{escape(clause)}</li>" for clause in report.unplanned)
     facts = f"{why}; method {report.method}, seed {report.seed}"
     return (
         f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"

@@ -33,7 +33,7 @@ def write_png(
     report: WeldReport,
     cloud: PointCloud,
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     *,
     log: ExecutionLog | None = None,
     known: tuple[KnownSeam, ...] = (),
@@ -83,7 +83,7 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
     figure.text(0.97, 0.905, why, fontsize=12, color=SOFT, va="center", ha="right")
 
 
-def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFindings, paths: tuple[TorchPath, ...]) -> None:
+def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFindings, paths: tuple[TorchPath | None, ...]) -> None:
     """The cloud as heights over the parent surface, seen along its normal, with lips, centre line and wires."""
     X_BS = view_frame(cloud, findings.seams)
     X_SB = X_BS.inverse()
@@ -102,6 +102,10 @@ def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFind
     for i, (seam, path) in enumerate(zip(findings.seams, paths, strict=False)):
         for k, side in enumerate(side for side in (seam.left_B, seam.right_B) if side is not None):
             _trace(axes, X_SB, side, LIPS, 1.2, "--", "lips" if i == k == 0 else None)
+        if path is None:
+            _trace(axes, X_SB, seam.points_B, EMPTY, 1.6, ":", None)
+            _number(axes, X_SB, seam.points_B, f"{i + 1}: no path")
+            continue
         # Seen along the normal a wire is a dot: its height is drawn obliquely, as in a cabinet projection.
         ends = 1e3 * X_SB.points(torch_axes(path).reshape(-1, 3)).reshape(-1, 2, 3)
         wires = ends[:, :, :2] + (ends[:, :, 2:] - ends[:, :1, 2:]) * OBLIQUE
@@ -110,8 +114,7 @@ def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFind
         )
         axes.scatter(*wires[:, 0].T, s=9, color=WIRE, zorder=3)
         _trace(axes, X_SB, path.X_BT.p[path.weld], SEAM, 2.4, "-", "torch path" if i == 0 else None)
-        start = 1e3 * X_SB.points(path.X_BT.p[path.weld][:1])[0]
-        axes.annotate(f"{i + 1}", start[:2], xytext=(-14, 8), textcoords="offset points", color=SEAM, weight="bold", fontsize=13)
+        _number(axes, X_SB, path.X_BT.p[path.weld], f"{i + 1}")
     axes.set_xlabel("along [mm]", color=INK)
     axes.set_ylabel("across [mm]", color=INK)
     axes.set_aspect("equal")
@@ -132,6 +135,12 @@ def _window(points_S: ndarray, seams_S: list[ndarray]) -> ndarray:
     width = max(size[0], size[1] / RATIO)
     half = np.array([width, RATIO * width]) / 2
     return np.stack([(low + high) / 2 - half, (low + high) / 2 + half])
+
+
+def _number(axes: Axes, X_SB: Transform, points_B: ndarray, text: str) -> None:
+    """`text` beside the first point of a line."""
+    start = 1e3 * X_SB.points(points_B[:1])[0]
+    axes.annotate(text, start[:2], xytext=(-14, 8), textcoords="offset points", color=SEAM, weight="bold", fontsize=13)
 
 
 def _trace(axes: Axes, X_SB: Transform, points_B: ndarray, colour: str, width: float, style: str, label: str | None) -> None:
@@ -176,7 +185,7 @@ def _section(axes: Axes, section: CrossSection) -> None:
 def _along(
     axes: Axes,
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     log: ExecutionLog | None,
     known: tuple[KnownSeam, ...],
     welded: int,

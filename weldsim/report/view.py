@@ -113,16 +113,17 @@ class ErrorLine:
 
 def error_lines(
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     log: ExecutionLog | None,
     known: tuple[KnownSeam, ...],
     welded: int,
 ) -> dict[str, ErrorLine]:
     """ "plan" and "executed" against the known seam that the welded one is paired with; empty when there is none."""
     partner = {i: known[j] for i, j in match_seams(findings.seams, known).pairs}.get(welded)
-    if partner is None or welded >= len(paths):
+    path = paths[welded] if welded < len(paths) else None
+    if partner is None or path is None:
         return {}
-    seam, path = findings.seams[welded], paths[welded]
+    seam = findings.seams[welded]
     weld = path.weld
     claimed = None if seam.sigma is None else np.interp(path.s[weld] - path.s[weld.start], seam.s, seam.sigma)
     out = {"plan": _error_line(path.X_BT.p[weld], partner, seam.reference, claimed)}

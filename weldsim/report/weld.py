@@ -20,13 +20,14 @@ LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mujoco", "mink", "ruck
 
 def weld_report(
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     *,
     scene: str,
     log: ExecutionLog | None = None,
     known: tuple[KnownSeam, ...] | None = None,
     true_region: Bool[ndarray, "n"] | None = None,
     welded: int = 0,
+    unplanned: tuple[str, ...] = (),
     timing: dict[str, float] | None = None,
     seed: int = 0,
     config_digest: str = "",
@@ -35,12 +36,13 @@ def weld_report(
     """Figures and verdict of one job.
 
     Args:
-        findings: what the seam finder returned.  paths: the torch path of each of its seams.
+        findings: what the seam finder returned.  paths: the torch path of each of its seams, None where it has none.
         scene: what was looked at, by name.
         log: what the arm did along `paths[welded]`, or None when nothing was executed.
         known: the true seams; () says that there is none, None that nobody knows.
         true_region: for each point of the cloud, whether it lies in a groove; None when unknown.
         welded: which of the paths is judged.
+        unplanned: found seams without a path, a clause each.
         timing: seconds a stage.  seed, config_digest: what it ran with.
         config: the limits.
 
@@ -55,6 +57,7 @@ def weld_report(
         scene=scene,
         method=findings.method,
         iou=None if true_region is None else region_overlap(findings.region > 0, true_region),
+        unplanned=unplanned,
         timing=dict(timing or {}),
         seed=seed,
         config_digest=config_digest,
@@ -64,8 +67,9 @@ def weld_report(
         draft = _against_known(draft, findings, paths, log, known, welded, failures)
     elif not findings.seams:
         failures.append("no seam was found")
-    if log is not None and welded < len(paths):
-        draft = _against_plan(draft, paths[welded], log, failures)
+    path = paths[welded] if welded < len(paths) else None
+    if log is not None and path is not None:
+        draft = _against_plan(draft, path, log, failures)
     judged = [check for check in checks(draft, config) if check.passed is not None]
     failures += [check.clause for check in judged if not check.passed]
     kept = tuple(check.clause for check in judged) or (f"{len(findings.seams)} found; no known seam to compare with",)
@@ -75,7 +79,7 @@ def weld_report(
 def _against_known(
     report: WeldReport,
     findings: SeamFindings,
-    paths: tuple[TorchPath, ...],
+    paths: tuple[TorchPath | None, ...],
     log: ExecutionLog | None,
     known: tuple[KnownSeam, ...],
     welded: int,
@@ -86,12 +90,13 @@ def _against_known(
     failures += [f"known seam {known[j].name or j + 1} was not found" for j in match.missed]
     report = replace(report, phantom_seams=len(match.phantoms))
     partner = {i: known[j] for i, j in match.pairs}.get(welded)
-    if partner is None or welded >= len(paths):
+    path = paths[welded] if welded < len(paths) else None
+    if partner is None or path is None:
         return report
     seam = findings.seams[welded]
     return replace(
         report,
-        plan=path_error(paths[welded], partner, seam),
+        plan=path_error(path, partner, seam),
         executed=None if log is None else executed_error(log, partner, seam),
         sigma_coverage=None if seam.sigma is None else sigma_coverage(seam.points_B, seam.sigma, partner, seam.reference),
     )
