@@ -10,12 +10,20 @@ import tyro
 
 from weldsim.cli.doctor import Doctor
 from weldsim.cli.plan import Plan
+from weldsim.cli.regress import Regress
 from weldsim.cli.run import Run
 from weldsim.cli.scan import Scan
 from weldsim.cli.scenes import Scenes
 from weldsim.errors import InputError
 
-COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {"plan": Plan, "run": Run, "scan": Scan, "scenes": Scenes, "doctor": Doctor}
+COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
+    "plan": Plan,
+    "run": Run,
+    "scan": Scan,
+    "scenes": Scenes,
+    "regress": Regress,
+    "doctor": Doctor,
+}
 DESCRIPTION = "Simulation-first digital twin of a vision-guided arc-welding cell. `weldsim --version` prints the version."
 
 _FRAME = re.compile(r"[│╭╮╰╯║|]")

@@ -1,0 +1,237 @@
+"""`weldsim regress` and the call behind it: figures do not depend on how they were made, what is worse is said."""
+
+import base64
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.clouds import groove_cloud
+from weldsim.cli import main
+from weldsim.cloud.files import read_cloud
+from weldsim.config import CellConfig
+from weldsim.errors import InputError
+from weldsim.records import PointCloud, SeamFindings
+from weldsim.regression import Golden, Regression, default_golden, read_golden, regress, updated, write_golden
+from weldsim.regression.recorded import figures_of_cloud, read_known_seam
+from weldsim.seam.find import find_seams
+
+pytestmark = pytest.mark.render
+
+
+def finds_nothing(cloud: PointCloud) -> SeamFindings:
+    """A finder of the user's own that never finds anything."""
+    return SeamFindings(seams=(), region=np.zeros(len(cloud), np.int32), method="nothing")
+
+
+def finds_as_ours(cloud: PointCloud) -> SeamFindings:
+    """A finder of the user's own that is weldsim's."""
+    return find_seams(cloud, CellConfig().seam)
+
+
+def timeless(outcome: Regression) -> list[dict[str, object]]:
+    """Every figure that is not a time."""
+    return [{k: v for k, v in row.figures.judged().items() if k != "seconds"} for row in outcome.rows]
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Regression:
+    """Straight and plain by the default method and by the two finders above, one seed."""
+    finders = {"nothing": finds_nothing, "ours": finds_as_ours}
+    return regress(["straight", "plain"], methods=("profile",), finders=finders, seeds=1)
+
+
+def test_rows_come_in_the_order_asked_for(outcome):
+    asked = [(scene, method, 0) for scene in ("straight", "plain") for method in ("profile", "nothing", "ours")]
+    assert [(row.figures.scene, row.figures.method, row.figures.seed) for row in outcome.rows] == asked
+    assert outcome.passed
+    assert not any(row.judged for row in outcome.rows)
+
+
+def test_figures_are_those_of_the_known_seam(outcome):
+    ours, nothing = (outcome.of("straight", method)[0].figures for method in ("profile", "nothing"))
+    assert (ours.known, ours.found, ours.missed, ours.phantoms) == (1, 1, 0, 0)
+    assert 0 < ours.mean < ours.p95 < ours.max < 1.5e-3
+    assert ours.coverage > 0.9
+    assert ours.iou > 0.8
+    assert (nothing.missed, nothing.coverage, nothing.mean, nothing.iou) == (1, 0.0, None, 0.0)
+    plain = outcome.of("plain", "profile")[0].figures
+    assert "mean" not in plain.judged()
+    assert plain.judged()["phantoms"] == 0
+
+
+def test_a_finder_of_ones_own_is_judged_as_ours(outcome):
+    rows = timeless(outcome)
+    assert rows[0] == rows[2]
+    assert rows[3] == rows[5]
+
+
+def test_figures_do_not_depend_on_processes(outcome):
+    twice = regress(["straight", "plain"], methods=("profile",), finders={"nothing": finds_nothing}, seeds=1, jobs=2)
+    assert timeless(twice) == [figures for k, figures in enumerate(timeless(outcome)) if k % 3 != 2]
+
+
+def test_bad_arguments_are_refused():
+    for arguments in ({"seeds": 0}, {"jobs": 0}, {"methods": ()}, {"methods": ("profile", "profile")}):
+        with pytest.raises(InputError):
+            regress(["straight"], **arguments)
+    for scenes in ([], ["straight", "straight"], ["no-such-scene"]):
+        with pytest.raises(InputError):
+            regress(scenes)
+
+
+def tightened(path: Path, by: float) -> Path:
+    """The golden figures of straight by the default method, as if the mean had once been smaller by `by` [m]."""
+    golden = read_golden(default_golden())
+    entries = golden.entries("straight", "profile")
+    mean = replace(entries["mean"], values=tuple(value - by for value in entries["mean"].values), tolerance=0.01e-3)
+    return write_golden(path, Golden(reason="for a test", scenes={"straight": {"profile": entries | {"mean": mean}}}))
+
+
+def test_the_command_passes_on_the_recorded_figures_and_fails_when_one_is_tightened(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["regress", "--scenes", "straight", "--methods", "profile", "--seeds", "1", "--jobs", "1"]
+    assert main([*words, "--json"]) == 0, capsys.readouterr().out
+    said = json.loads(capsys.readouterr().out)
+    assert said["passed"]
+    assert [row["judged"] for row in said["rows"]] == [True]
+    assert list(tmp_path.iterdir()) == []
+
+    tight = tightened(tmp_path / "tight.json", 0.1e-3)
+    assert main([*words, "--golden", str(tight), "--junit", "out.xml", "--html", "out.html"]) == 1
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "WORSE straight, profile, seed 0: cross-track mean" in out
+    assert "worse by 0.100 mm (tolerance 0.010 mm)" in out
+    assert "left runs/regress/straight-profile-0" in out
+    check_junit(tmp_path / "out.xml")
+    check_page((tmp_path / "out.html").read_text())
+    left = {path.name for path in (tmp_path / "runs/regress/straight-profile-0").iterdir()}
+    assert {"config.json", "cloud.ply", "path.json", "report.html", "report.png", "run.json"} <= left
+    config = json.loads((tmp_path / "runs/regress/straight-profile-0/config.json").read_text())
+    assert config["seed"] == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.html", "out.xml", "runs", "tight.json"]
+
+
+def check_junit(path: Path) -> None:
+    """One suite with one failed case, counted as such, as continuous-integration systems read it."""
+    root = ElementTree.parse(path).getroot()
+    assert root.tag == "testsuites"
+    (suite,) = root
+    (case,) = suite
+    for element in (root, suite):
+        counts = [element.get(name) for name in ("tests", "failures", "errors", "skipped")]
+        assert counts == ["1", "1", "0", "0"]
+        assert float(element.get("time", "")) > 0
+    assert suite.get("name") == "straight"
+    assert (case.tag, case.get("classname"), case.get("name")) == ("testcase", "straight.profile", "seed 0")
+    failure = case.find("failure")
+    assert failure is not None
+    assert "cross-track mean" in (failure.get("message") or "")
+    assert failure.get("type")
+    assert "straight-profile-0" in (failure.text or "")
+    assert "mean" in (case.findtext("system-out") or "")
+
+
+def check_page(text: str) -> None:
+    """The page names what is worse, carries its pictures and loads nothing."""
+    assert "WORSE" in text
+    assert "cross-track mean" in text
+    assert not re.search(r"(src|href)=\"(?!data:)|url\(|https?:", text)
+    _, _, rest = text.partition("data:image/jpeg;base64,")
+    picture = cv2.imdecode(np.frombuffer(base64.b64decode(rest.partition('"')[0]), np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape[1] == 1000
+    assert picture.std() > 20
+
+
+def test_an_update_rewrites_with_a_reason_and_then_nothing_is_worse(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["regress", "--scenes", "plain", "--methods", "profile", "--seeds", "1", "--jobs", "1", "--golden", "mine.json"]
+    assert main([*words, "--update", "--reason", "a new scene"]) == 0
+    golden = read_golden("mine.json")
+    assert golden.reason == "a new scene"
+    assert set(golden.scenes) == {"plain"}
+    assert main(words) == 0
+    assert "nothing is worse" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.json"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--scenes", "no-such-scene"],
+        ["--scenes", "missing.toml"],
+        ["--scenes", "straight", "straight"],
+        ["--methods", "magic"],
+        ["--seeds", "0"],
+        ["--seeds", "-1"],
+        ["--jobs", "0"],
+        ["--golden", "broken.json"],
+        ["--golden", "missing.json"],
+        ["--junit", "no/folder/out.xml"],
+        ["--junit", "out.txt"],
+        ["--junit", "."],
+        ["--html", "out.png"],
+        ["--html", "no/folder/out.html"],
+        ["--junit", "broken.json"],
+        ["--keep", "broken.json/kept"],
+        ["--update"],
+        ["--update", "--reason", " "],
+        ["--reason", "why"],
+        ["--update", "--reason", "why", "--set", "path.speed=6 mm/s", "--golden", "x.json"],
+        ["--update", "--reason", "why", "--golden", "no/folder/x.json"],
+        ["--set", "scene.groove.width=10 mm"],
+        ["--set", "seam.methd=thesis"],
+    ],
+    ids=" ".join,
+)
+def test_bad_input_is_one_line_and_writes_nothing(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken.json").write_text("{")
+    assert main(["regress", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    assert [path.name for path in tmp_path.iterdir()] == ["broken.json"]
+
+
+def test_a_view_out_of_reach_is_said_and_not_an_end(tmp_path):
+    from weldsim.config import apply_overrides, load_toml, structure
+    from weldsim.scene.config import SceneConfig
+    from weldsim.scene.files import scene_path
+
+    tables = apply_overrides({"name": "far", **load_toml(scene_path("straight"))}, ["pose.y=-1500 mm", "name=far"])
+    far = structure(tables, SceneConfig)
+    seen = regress([far], methods=("profile",), seeds=1)
+    assert "scan view" in seen.rows[0].figures.refused
+    assert (seen.rows[0].figures.missed, seen.passed) == (1, True)
+    near = regress([replace(far, pose=replace(far.pose, y=-0.45))], methods=("profile",), seeds=1)
+    golden = updated(Golden(), [row.figures for row in near.rows], "where it was in reach")
+    worse = regress([far], methods=("profile",), seeds=1, golden=golden, keep=tmp_path)
+    assert "missed" in {deviation.figure for deviation in worse.deviations}
+    assert json.loads((tmp_path / "far-profile-0" / "run.json").read_text())["refused"]
+
+
+def test_a_recorded_cloud_is_judged_against_a_seam_in_a_csv(tmp_path):
+    made = groove_cloud(np.random.default_rng(1), noise="iid", sigma=0.0002)
+    rows = np.hstack([made.seam.opening_B, -made.seam.bisectors_B])
+    np.savetxt(tmp_path / "seam.csv", rows, delimiter=",")
+    known = read_known_seam(tmp_path / "seam.csv")
+    assert known.length == pytest.approx(made.seam.length, rel=1e-6)
+    figures = figures_of_cloud("mine", made.cloud, known, has_axes=True)
+    assert (figures.missed, figures.phantoms) == (0, 0)
+    assert figures.mean < 0.4e-3
+    assert figures.axis_p95 < np.deg2rad(4)
+    np.savetxt(tmp_path / "bare.csv", made.seam.opening_B, delimiter=",")
+    bare = figures_of_cloud("mine", made.cloud, read_known_seam(tmp_path / "bare.csv"))
+    assert bare.axis_p95 is None
+    assert bare.mean == pytest.approx(figures.mean, abs=1e-6)
+    assert len(read_cloud(tmp_path / "bare.csv")) == len(made.seam.opening_B)
+    np.savetxt(tmp_path / "dot.csv", np.tile(made.seam.opening_B[:1], (5, 1)), delimiter=",")
+    with pytest.raises(InputError):
+        read_known_seam(tmp_path / "dot.csv")

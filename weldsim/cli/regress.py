@@ -1,0 +1,185 @@
+"""`weldsim regress`."""
+
+import os
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, Method, choose_platform
+from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
+from weldsim.cli.show import print_json, progress, table
+from weldsim.errors import InputError
+
+if TYPE_CHECKING:
+    from weldsim.regression import Golden, Regression
+
+
+@dataclass(frozen=True, kw_only=True)
+class Regress(ConfigOptions):
+    """Hold every scene's figures against recorded ones, and say which are worse, where and by how much.
+
+    Each scene is scanned once for every seed and planned by both methods; every figure of the plan against the known seam is
+    compared with tests/regression/golden.json (in an installed package: weldsim/_data/regression/golden.json). Exits 1 when a
+    figure is worse than its tolerance allows; a better one never fails. What fails leaves its run directory.
+    """
+
+    scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SCENE ...")] = ()
+    """Names or TOML files; all that come with weldsim by default."""
+
+    methods: Annotated[tuple[Method, ...], tyro.conf.arg(metavar="METHOD ...")] = ("profile", "thesis")
+    """Seam finders."""
+
+    seeds: int = 3
+    """How many seeds of the camera's noise: 0 to SEEDS - 1."""
+
+    jobs: int = field(default_factory=lambda: min(4, os.cpu_count() or 1))
+    """Processes, a core each; as many as there are cores, 4 at most, by default."""
+
+    execute: bool = False
+    """Let the simulated arm weld what was planned too. Left out by default: it takes several times as long as everything
+    else, and what it adds to the error of the plan depends on the arm, not on what perception sees."""
+
+    junit: Path | None = None
+    """Where to write JUnit XML for a continuous-integration system."""
+
+    html: Path | None = None
+    """Where to write a self-contained page with the table and a picture of every scene."""
+
+    golden: Path | None = None
+    """Another file of golden figures."""
+
+    keep: Path = Path("runs/regress")
+    """Folder for the run directories of what fails."""
+
+    update: bool = False
+    """Accept the figures: rewrite the golden file. Needs --reason."""
+
+    reason: str | None = None
+    """Why the golden figures change; kept beside every figure that does."""
+
+    def __call__(self) -> int:
+        """0 where nothing is worse, else 1; 0 after an update."""
+        from weldsim.regression import default_golden, regress
+
+        path = self.golden or default_golden()
+        self._check(path)
+        golden = self._golden(path)
+        config = self.cell()
+        scenes = [self.scene_of(name) for name in self.scenes] or None
+        choose_platform()
+        with progress() as tell:
+            outcome = regress(
+                scenes,
+                methods=self.methods,
+                seeds=self.seeds,
+                jobs=self.jobs,
+                config=config,
+                execute=self.execute,
+                golden=golden,
+                keep=None if self.update else self.keep,
+                pictures=self.html is not None,
+                tell=tell,
+            )
+        written = self._write(outcome, golden, path)
+        if self.json:
+            print_json(self._document(outcome, path, written))
+        else:
+            self._print(outcome, path, written)
+        return 0 if outcome.passed or self.update else 1
+
+    def _check(self, path: Path) -> None:
+        """Raises InputError for options that do not go together, OutputError for places that cannot be written."""
+        from weldsim.regression.golden import is_packed
+
+        if self.update and not (self.reason or "").strip():
+            raise InputError("--update: needs --reason, which is kept beside every figure that changes")
+        if self.reason is not None and not self.update:
+            raise InputError("--reason: is for --update")
+        if self.update and (self.config is not None or self.set):
+            raise InputError("--update: golden figures are those of the default settings; leave --config and --set out")
+        if self.update and is_packed(path):
+            raise InputError(f"--update: {path} belongs to the installed package; give --golden", path=str(path))
+        if any(text.startswith(SCENE_PREFIX) for text in self.set) and not self.scenes:
+            raise InputError("--set scene.KEY: name the scenes with --scenes")
+        for name, value in (("seeds", self.seeds), ("jobs", self.jobs)):
+            if value < 1:
+                raise InputError(f"--{name} {value}: 1 or more is needed", key=name, value=value)
+        check_suffix(self.junit, (".xml",), "JUnit output")
+        check_suffix(self.html, (".html", ".htm"), "a page")
+        check_outputs((self.junit, self.html, path if self.update else None), (self.config, None if self.update else path))
+        if not self.update:
+            check_folder(nearest_folder(self.keep / "run"), self.keep)
+
+    def _golden(self, path: Path) -> "Golden":
+        """What to judge by; nothing yet where the first recording is asked for."""
+        from weldsim.regression import Golden, read_golden
+
+        return Golden() if self.update and not path.exists() else read_golden(path)
+
+    def _write(self, outcome: "Regression", golden: "Golden", path: Path) -> list[Path]:
+        written = []
+        if self.junit is not None:
+            from weldsim.regression.junit import write_junit
+
+            written.append(write_junit(self.junit, outcome))
+        if self.html is not None:
+            from weldsim.regression.page import write_page
+
+            written.append(write_page(self.html, outcome))
+        if self.update:
+            from weldsim.regression import updated, write_golden
+            from weldsim.scene.files import scene_names
+
+            renewed = updated(golden, [row.figures for row in outcome.rows], self.reason or "")
+            if not self.scenes:  # all scenes ran: what is recorded of others is of scenes that are no more
+                renewed = replace(renewed, scenes={k: v for k, v in renewed.scenes.items() if k in scene_names()})
+            written.append(write_golden(path, renewed))
+        return written
+
+    def _document(self, outcome: "Regression", path: Path, written: list[Path]) -> dict[str, Any]:
+        from weldsim.regression.text import sentence
+
+        rows = [
+            {
+                "scene": row.figures.scene,
+                "method": row.figures.method,
+                "seed": row.figures.seed,
+                "passed": row.passed,
+                "judged": row.judged,
+                "figures": row.figures.judged(),
+                "timing": {"scan": row.scan_seconds, **row.figures.timing},
+                "refused": row.figures.refused or None,
+                "worse": [sentence(deviation) for deviation in row.deviations],
+                "folder": row.folder,
+            }
+            for row in outcome.rows
+        ]
+        return {
+            "passed": outcome.passed,
+            "golden": str(path),
+            "units": {"length": "m", "angle": "rad", "time": "s"},
+            "seconds": outcome.seconds,
+            "jobs": outcome.jobs,
+            "rows": rows,
+            "written": [str(place) for place in written],
+        }
+
+    def _print(self, outcome: "Regression", path: Path, written: list[Path]) -> None:
+        from weldsim.regression.text import HEAD, rows_of_text, sentence
+
+        print(table(rows_of_text(outcome), HEAD))
+        where = (
+            f"{len(outcome.rows)} plans in {outcome.seconds:.1f} s with {outcome.jobs} process{'es' if outcome.jobs > 1 else ''}"
+        )
+        print(f"  {where}; median / worst of {outcome.seeds} seed{'s' if outcome.seeds > 1 else ''}")
+        for row in outcome.rows:
+            for deviation in row.deviations:
+                print(f"  WORSE {sentence(deviation)}")
+            if row.folder is not None:
+                print(f"  left {row.folder}")
+        if not self.update:
+            print(f"  {'nothing is' if outcome.passed else f'{len(outcome.deviations)} figures are'} worse than {path} allows")
+        for place in written:
+            print(f"  wrote {place}")

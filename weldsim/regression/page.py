@@ -1,0 +1,96 @@
+"""The regression as one self-contained page: what is worse, the table, a picture of every scene and method."""
+
+import base64
+from html import escape
+from pathlib import Path
+
+from weldsim import __version__
+from weldsim.output import write_whole
+from weldsim.regression.figures import FIGURES
+from weldsim.regression.job import Row
+from weldsim.regression.suite import Regression
+from weldsim.regression.text import HEAD, number, rows_of_text, sentence
+from weldsim.report.html import STYLE
+
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+MORE = """
+.worse{color:var(--bad);font-weight:600}.ok{color:var(--good)}.new{color:var(--soft)}
+figure{margin:0}img{width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px;margin:6px 0 0}
+td,th{white-space:nowrap}td.why{white-space:normal;color:var(--soft)}
+"""
+
+
+def page(outcome: Regression) -> str:
+    """The HTML text; it asks nothing of any network."""
+    failed = len(outcome.deviations)
+    word, look = ("WORSE", "bad") if failed else ("NOT WORSE", "good")
+    facts = (
+        f"{len(outcome.scenes)} scenes, {len(outcome.methods)} methods, {outcome.seeds} seeds, {outcome.jobs} processes,"
+        f" {outcome.seconds:.0f} s; weldsim {__version__}"
+    )
+    listed = "".join(f"<li>{escape(sentence(deviation))}</li>" for deviation in outcome.deviations)
+    body = (
+        f"<header><div><h1>Regression against known seams</h1><p>{escape(facts)}</p></div>"
+        f'<div class="verdict {look}">{word}</div></header>'
+        + (f'<ul class="reasons">{listed}</ul>' if listed else "")
+        + _table(outcome)
+        + _pictures(outcome)
+        + _seeds(outcome)
+    )
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>weldsim regress</title>'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta name="viewport" content="width=device-width,initial-scale=1"><style>{STYLE}{MORE}</style></head>'
+        f"<body><main>{body}</main></body></html>\n"
+    )
+
+
+def write_page(path: Path, outcome: Regression) -> Path:
+    """The file written. Raises OutputError."""
+    return write_whole(path, page(outcome))
+
+
+def _table(outcome: Regression) -> str:
+    """Median / worst of the seeds."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in HEAD)
+    rows = []
+    for cells in rows_of_text(outcome):
+        plain = "".join(f'<td class="num">{escape(cell)}</td>' for cell in cells[:-1])
+        rows.append(f'<tr>{plain}<td class="{cells[-1].lower()}">{cells[-1]}</td></tr>')
+    note = "Median / worst of the seeds; cross-track error of the planned torch tip from the opening of the known seam."
+    return f"<section><h2>Figures</h2><p>{note}</p><table><tr>{head}</tr>{''.join(rows)}</table></section>"
+
+
+def _pictures(outcome: Regression) -> str:
+    shown = [row for row in outcome.rows if row.picture is not None]
+    if not shown:
+        return ""
+    return f'<div class="two">{"".join(map(_figure, shown))}</div>'
+
+
+def _figure(row: Row) -> str:
+    f = row.figures
+    data = base64.b64encode(row.picture or b"").decode()
+    caption = f"{f.scene}, {f.method}, seed {f.seed}" + (f": {f.refused}" if f.refused else "")
+    alt = f"Scan of {f.scene} with the seam that {f.method} found"
+    return (
+        f'<section><figure><img alt="{escape(alt)}" src="data:image/jpeg;base64,{data}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure></section>"
+    )
+
+
+def _seeds(outcome: Regression) -> str:
+    """Every row, every figure."""
+    names = [name for name in FIGURES if any(name in row.figures.judged() for row in outcome.rows)]
+    head = "".join(f"<th>{escape(text)}</th>" for text in ("scene", "method", "seed", *(FIGURES[name].label for name in names), ""))
+    rows = []
+    for row in outcome.rows:
+        figures, worse = row.figures.judged(), {deviation.figure for deviation in row.deviations}
+        cells = "".join(
+            f'<td class="{"worse" if name in worse else "num"}">{escape(text)}</td>'
+            for name, text in ((name, number(name, figures[name]) if name in figures else "") for name in names)
+        )
+        start = f"<td>{escape(row.figures.scene)}</td><td>{escape(row.figures.method)}</td><td>{row.figures.seed}</td>"
+        why = " ".join(filter(None, (row.figures.refused, f"run directory {row.folder}" if row.folder else "")))
+        rows.append(f'<tr>{start}{cells}<td class="why">{escape(why)}</td></tr>')
+    return f"<section><h2>Every seed</h2><table><tr>{head}</tr>{''.join(rows)}</table></section>"

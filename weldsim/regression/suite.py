@@ -1,0 +1,185 @@
+"""regress: every scene, method and seed, in this process or in several, in an order and with figures that do not depend on how."""
+
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from weldsim.config import CellConfig, load_toml, structure
+from weldsim.errors import ExecutionError, InputError
+from weldsim.pipeline import Finder
+from weldsim.regression.golden import Deviation, Golden
+from weldsim.regression.job import Row, Task, carry_out
+from weldsim.scene.files import scene_names, scene_path
+
+if TYPE_CHECKING:
+    from weldsim.scene.config import SceneConfig
+
+Method = Literal["profile", "thesis"]
+METHODS: tuple[Method, ...] = ("profile", "thesis")
+Tell = Callable[[str, float | None], None]
+"""Told what was finished and the fraction of all tasks done, 0 to 1."""
+
+# A job a core: threads of libraries inside a worker would only take turns with the other workers.
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Regression:
+    """The outcome.
+
+    Attributes:
+        rows: by scene, then method, then seed, in the order they were asked for.
+        scenes, methods: in that order.  seeds, jobs: as asked.  seconds: from start to end [s].
+    """
+
+    rows: tuple[Row, ...]
+    scenes: tuple[str, ...]
+    methods: tuple[str, ...]
+    seeds: int
+    jobs: int
+    seconds: float
+
+    @property
+    def deviations(self) -> tuple[Deviation, ...]:
+        """Everything that is worse than it may be."""
+        return tuple(deviation for row in self.rows for deviation in row.deviations)
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is worse than it may be."""
+        return not self.deviations
+
+    def of(self, scene: str, method: str) -> tuple[Row, ...]:
+        """The rows of one scene and method, a seed each."""
+        return tuple(row for row in self.rows if (row.figures.scene, row.figures.method) == (scene, method))
+
+
+def regress(
+    scenes: "Sequence[str | Path | SceneConfig] | None" = None,
+    *,
+    methods: Sequence[Method] = METHODS,
+    finders: Mapping[str, Finder] | None = None,
+    seeds: int = 3,
+    jobs: int = 1,
+    config: CellConfig | None = None,
+    execute: bool = False,
+    golden: Golden | None = None,
+    keep: Path | None = None,
+    pictures: bool = False,
+    tell: Tell | None = None,
+) -> Regression:
+    """Figures of every scene, method and seed against its known seams, beside golden ones.
+
+    Args:
+        scenes: names, TOML files or configs; None = all that come with weldsim.
+        methods: seam finders of weldsim's.  finders: {name: the caller's own}, judged besides.
+        seeds: of the camera's noise, 0 to seeds - 1; each scene and seed is scanned once for all methods.
+        jobs: processes, each with one core; 1 = this process.
+        config: settings; its method is replaced by each of `methods`.
+        execute: whether the simulated arm welds what was planned.
+        golden: figures to judge by; what it lacks is not judged.
+        keep: folder in which what fails leaves its run directory.
+        pictures: whether rows of seed 0 carry a picture.
+        tell: told of progress.
+    Raises:
+        InputError: no scene, an unknown or repeated one, no method, seeds or jobs below 1.
+        ExecutionError: a worker process died.
+    """
+    started, tell = time.perf_counter(), tell or (lambda what, done: None)
+    chosen = _scenes(scenes)
+    settings = _settings(config or CellConfig(), methods, finders or {})
+    for name, value in (("seeds", seeds), ("jobs", jobs)):
+        if value < 1:
+            raise InputError(f"{name} {value}: 1 or more is needed", key=name, value=value)
+    tasks = [
+        Task(
+            scene=scene,
+            seed=seed,
+            methods=settings,
+            finders=dict(finders or {}),
+            execute=execute,
+            golden={} if golden is None else {method: golden.entries(scene.name, method) for method in settings},
+            keep=keep,
+            pictures=pictures and seed == 0,
+        )
+        for scene in chosen
+        for seed in range(seeds)
+    ]
+    done = _in_this_process(tasks, tell) if jobs == 1 else _in_processes(tasks, min(jobs, len(tasks)), tell)
+    rows = [row for rows in done for row in rows]
+    order = {(scene.name, method): k for k, (scene, method) in enumerate((s, m) for s in chosen for m in settings)}
+    rows.sort(key=lambda row: (order[row.figures.scene, row.figures.method], row.figures.seed))
+    return Regression(
+        rows=tuple(rows),
+        scenes=tuple(scene.name for scene in chosen),
+        methods=tuple(settings),
+        seeds=seeds,
+        jobs=jobs,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _scenes(scenes: "Sequence[str | Path | SceneConfig] | None") -> "list[SceneConfig]":
+    from weldsim.scene.config import SceneConfig
+
+    chosen = []
+    for scene in scene_names() if scenes is None else scenes:
+        if not isinstance(scene, SceneConfig):
+            path = scene_path(scene)
+            scene = structure({"name": path.stem, **load_toml(path)}, SceneConfig, where=str(scene))
+        if scene.name in [other.name for other in chosen]:
+            raise InputError(f"scene {scene.name!r} is given twice", scene=scene.name)
+        if not scene.name or any(mark in scene.name for mark in ("/", "\\", "\0")) or scene.name.startswith("."):
+            raise InputError(f"scene name {scene.name!r} cannot name a folder", scene=scene.name)
+        chosen.append(scene)
+    if not chosen:
+        raise InputError("no scene is given")
+    return chosen
+
+
+def _settings(config: CellConfig, methods: Sequence[Method], finders: Mapping[str, Finder]) -> dict[str, CellConfig]:
+    """{method: config}."""
+    names = [*methods, *finders]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"methods {', '.join(names) or '(none)'}: each once, one at least", methods=names)
+    known = {method: replace(config, seam=replace(config.seam, method=method)) for method in methods}
+    return known | dict.fromkeys(finders, config)
+
+
+def _in_this_process(tasks: list[Task], tell: Tell) -> list[tuple[Row, ...]]:
+    out = []
+    for k, task in enumerate(tasks):
+        tell(f"{task.scene.name}, seed {task.seed}", k / len(tasks))
+        out.append(carry_out(task))
+    return out
+
+
+def _in_processes(tasks: list[Task], jobs: int, tell: Tell) -> list[tuple[Row, ...]]:
+    """Spawned, not forked: OpenGL contexts and thread pools do not survive a fork. Long tasks go first."""
+    out: list[tuple[Row, ...]] = [()] * len(tasks)
+    longest = sorted(range(len(tasks)), key=lambda k: -len(tasks[k].scene.views))
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+            waiting = {pool.submit(carry_out, tasks[k]): k for k in longest}
+            try:
+                for count, future in enumerate(as_completed(waiting), start=1):
+                    k = waiting[future]
+                    out[k] = future.result()
+                    tell(f"{tasks[k].scene.name}, seed {tasks[k].seed}", count / len(tasks))
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    except BrokenProcessPool:
+        raise ExecutionError("a worker process died (out of memory?); use fewer jobs", rule="jobs", value=jobs) from None
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+    return out

@@ -1,0 +1,89 @@
+"""Figures in words: the table that people read, and what is worse, where and by how much."""
+
+import statistics
+
+from weldsim import units
+from weldsim.regression.figures import FIGURES, Figures
+from weldsim.regression.golden import Deviation
+from weldsim.regression.suite import Regression
+
+COLUMNS: tuple[tuple[str, str], ...] = (
+    ("mean", "mean mm"),
+    ("p95", "p95 mm"),
+    ("max", "max mm"),
+    ("coverage", "coverage"),
+    ("phantom_length", "phantom mm"),
+    ("axis_p95", "axis p95 deg"),
+    ("iou", "IoU"),
+    ("seconds", "seconds"),
+)
+HEAD = ("scene", "method", "found", *(head for _, head in COLUMNS), "golden")
+
+
+def number(name: str, value: float | None, *, unit: bool = True) -> str:
+    """A figure in the unit that people read it in."""
+    if value is None:
+        return "none" if unit else "-"
+    kind = FIGURES[name].kind
+    if kind == "length":
+        return f"{units.to_mm(value):.3f}{' mm' if unit else ''}"
+    if kind == "angle":
+        return f"{units.to_deg(value):.2f}{' deg' if unit else ''}"
+    return {"share": f"{value:.3f}", "count": f"{value:g}", "time": f"{value:.2f}{' s' if unit else ''}"}[kind]
+
+
+def sentence(deviation: Deviation) -> str:
+    """What is worse, where and by how much."""
+    d, figure = deviation, FIGURES[deviation.figure]
+    where = f"{d.scene}, {d.method}, seed {d.seed}: {figure.label}"
+    if d.value is None:
+        return f"{where} could not be measured, was {number(d.figure, d.golden)}"
+    worse = d.golden - d.value if figure.larger_is_better else d.value - d.golden
+    return (
+        f"{where} {number(d.figure, d.value)}, was {number(d.figure, d.golden)}: worse by {number(d.figure, worse)}"
+        f" (tolerance {number(d.figure, d.tolerance)})"
+    )
+
+
+def worst(figures: list[Figures], name: str) -> float | None:
+    """The worst of a figure over the seeds that have it; None where none has."""
+    values = _values(figures, name)
+    if not values:
+        return None
+    return min(values) if FIGURES[name].larger_is_better else max(values)
+
+
+def median(figures: list[Figures], name: str) -> float | None:
+    """The median of a figure over the seeds that have it; None where none has."""
+    values = _values(figures, name)
+    return statistics.median(values) if values else None
+
+
+def _values(figures: list[Figures], name: str) -> list[float]:
+    measured = [row.judged().get(name) for row in figures]
+    return [value for value in measured if value is not None]
+
+
+def standing(outcome: Regression, scene: str, method: str) -> str:
+    """How a scene and method stand beside the golden figures: "ok", "WORSE" or "new"."""
+    rows = outcome.of(scene, method)
+    if any(row.deviations for row in rows):
+        return "WORSE"
+    return "ok" if any(row.judged for row in rows) else "new"
+
+
+def rows_of_text(outcome: Regression) -> list[list[str]]:
+    """A line for each scene and method under `HEAD`: median and worst of the seeds."""
+    out = []
+    for scene in outcome.scenes:
+        for method in outcome.methods:
+            figures = [row.figures for row in outcome.of(scene, method)]
+            hit, known = sum(f.known - f.missed for f in figures), sum(f.known for f in figures)
+            cells = []
+            for name, _ in COLUMNS:
+                middle, most = median(figures, name), worst(figures, name)
+                same = outcome.seeds == 1 or middle == most
+                ends = (number(name, middle, unit=False), number(name, most, unit=False))
+                cells.append(ends[0] if same else " / ".join(ends))
+            out.append([scene, method, f"{hit}/{known}", *cells, standing(outcome, scene, method)])
+    return out
