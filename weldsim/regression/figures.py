@@ -16,7 +16,7 @@ from numpy import ndarray
 from weldsim.config import CellConfig
 from weldsim.path.asked import leaned, wire_tip
 from weldsim.pipeline import PlanResult
-from weldsim.records import KnownSeam, LineError, WeldReport
+from weldsim.records import KnownSeam, LineError, Seam, TorchPath, WeldReport
 from weldsim.report.metrics import match_seams, region_overlap
 from weldsim.report.weld import path_error
 
@@ -70,14 +70,14 @@ class Figures:
 
     Attributes:
         scene, method, seed: of what.  known, found: how many seams there are, how many were found.
-        missed: known seams that nothing stands for.  phantoms: seams found that are none; phantom_length: theirs [m].
+        missed: known seams without a path.  phantoms: seams found that are none; phantom_length: theirs [m].
         mean, p95, max: cross-track distance of the planned tip from the opening [m].
         coverage: share of the known length.  axis_median, axis_p95: wire axis from the known inward bisector [rad].
         iou: points of the cloud in both the groove region found and the true one, over points in either; a point is truly
             in the groove where the exact image shows the groove's own surface at its pixel.
         executed_mean, executed_p95: of the simulated arm's tip from the opening [m].  tracking_p95: from the plan [m].
         seconds: cloud, seam and path stages together [s].  timing: seconds a stage.
-        refused: why there is no plan, where there is none.
+        refused: why there is no plan, or none along some of the seams found.
     """
 
     scene: str
@@ -133,8 +133,9 @@ def figures_of(
         report: of the executed weld, where it was executed.  has_axes: whether the known bisectors mean anything.
     """
     match = match_seams(result.findings.seams, tuple(known))
-    pairs = [(i, j) for i, j in match.pairs if i < len(result.paths)]
-    errors = {j: _error(result, i, known[j], config) for i, j in pairs}
+    paths = dict(enumerate(result.paths))
+    pairs = [(i, j, path) for i, j in match.pairs if (path := paths.get(i)) is not None]
+    errors = {j: _error(path, result.findings.seams[i], known[j], config) for i, j, path in pairs}
     out = Figures(
         scene=scene,
         method=method,
@@ -150,18 +151,17 @@ def figures_of(
         timing=dict(result.timing),
     )
     if errors:
-        out = _with_errors(out, errors, {i: j for j, i in pairs}, result, known, has_axes)
+        out = _with_errors(out, errors, {j: i for i, j, _ in pairs}, result, known, has_axes)
     if report is not None and report.executed is not None:
         executed = report.executed
         out = replace(out, executed_mean=executed.mean, executed_p95=executed.p95, tracking_p95=report.tracking_p95)
     return out
 
 
-def _error(result: PlanResult, index: int, known: KnownSeam, config: CellConfig) -> LineError:
+def _error(path: TorchPath, seam: Seam, known: KnownSeam, config: CellConfig) -> LineError:
     """Of one path, with the angles and the stick-out that the config asks for taken off."""
-    path = result.paths[index]
     tip = replace(path, X_BT=wire_tip(path.X_BT, config.path))
-    return path_error(tip, leaned(known, path, config.path), result.findings.seams[index])
+    return path_error(tip, leaned(known, path, config.path), seam)
 
 
 def _with_errors(

@@ -114,7 +114,7 @@ def _planned(task: Task, method: str, seen: Sighting) -> Row:
         true_region=true_region(seen.captures, seen.cloud, result.cloud),
         report=done.report,
     )
-    figures = replace(figures, refused=refused)
+    figures = replace(figures, refused=refused or "; ".join(map(str, result.refused.values())))
     entries = task.golden.get(method, {})
     deviations = compare(figures, entries)
     folder = picture = None
