@@ -262,6 +262,7 @@ def finish(
             true_region=true_region(seen.captures, seen.cloud, result.cloud),
             welded=welded,
             unplanned=unplanned(result),
+            trims=(config.path.start_trim, config.path.end_trim),
             seed=seen.seed,
             config_digest=result.config_digest,
             config=config.report,

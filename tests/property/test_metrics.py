@@ -177,3 +177,20 @@ def test_wire_axes_are_interpolated_as_directions() -> None:
     error = line_error(pair, unit(np.array([known.bisectors_B[0], known.bisectors_B[-1]])), known)
     assert error.axis_p95 < 1e-9
     assert error.max < 0.013
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("seed", range(5))
+def test_what_was_to_be_left_out_is_not_missed(seed: int, backwards: bool) -> None:
+    known = sine_seam(np.random.default_rng(seed))
+    first, last = np.random.default_rng(seed + 100).uniform(0.005, 0.06, 2)
+    part = (known.s >= first) & (known.s <= known.length - last)
+    step = -1 if backwards else 1
+    line, wire = known.opening_B[part][::step], axes(known)[part][::step]
+    trims = (last, first) if backwards else (first, last)
+    asked = line_error(line, wire, known, trims=trims)
+    assert asked.coverage > 0.99
+    assert abs(asked.start) < 0.5e-3
+    assert abs(asked.end) < 0.5e-3
+    assert line_error(line, wire, known).coverage == pytest.approx(1 - (first + last) / known.length, abs=0.005)
+    assert line_error(line[len(line) // 2 :], wire[len(line) // 2 :], known, trims=trims).coverage < 0.6

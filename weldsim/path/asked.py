@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from weldsim.curves import project
+from weldsim.curves import interpolate, project
 from weldsim.frames import Transform, unit
 from weldsim.path.config import PathConfig
 from weldsim.path.plan import lean
@@ -20,9 +20,12 @@ def leaned(known: KnownSeam, path: TorchPath, config: PathConfig) -> KnownSeam:
     """The known seam whose `bisectors_B` are the wire axes asked for: leaned by work and travel angle, as `path` travels it."""
     if config.work_angle == 0 and config.travel_angle == 0:
         return known
-    _, _, s = project(path.X_BT.p[path.weld][[0, -1]], known.opening_B)
+    X = path.X_BT[path.weld]
+    _, _, s = project(X.p, known.opening_B)
+    # By the direction all along, not by where it begins and ends: around a ring that is the same place.
+    ahead = np.einsum("ij,ij->", X.R[:, :, 0], interpolate(known.s, known.tangents_B, s)) >= 0
     z = known.bisectors_B
-    x = known.tangents_B * (1.0 if s[1] >= s[0] else -1.0)
+    x = known.tangents_B * (1.0 if ahead else -1.0)
     x = unit(x - np.einsum("ij,ij->i", x, z)[:, None] * z)
     upright = np.stack([x, np.cross(z, x), z], axis=-1)
     return replace(known, bisectors_B=(upright @ lean(config.work_angle, config.travel_angle))[:, :, 2])

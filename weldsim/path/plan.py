@@ -23,7 +23,8 @@ def plan_path(seam: Seam, config: PathConfig | None = None) -> TorchPath:
     """The WELD along a seam: the tip on its points, the wire along its inward bisector, x along travel.
 
     The wire axis is minus the seam's normal, smoothed and limited in its turn, then leaned by work and travel angle about
-    the seam point. Approach and retract belong to the cell and are added by motion planning.
+    the seam point. Approach and retract belong to the cell and are added by motion planning. Around a ring the torch ends
+    as it began.
 
     Args:
         seam: in B.
@@ -33,8 +34,11 @@ def plan_path(seam: Seam, config: PathConfig | None = None) -> TorchPath:
     """
     config = config or PathConfig()
     s, points, travel, wire = _nodes(*_trimmed(seam, config))
-    wire = limited(s, smooth(s, wire, config.smoothing), MARGIN * config.turn_limit)
-    travel = smooth(s, travel, config.smoothing)
+    around, middle = s, slice(None)
+    if seam.closed and config.start_trim == config.end_trim == 0:
+        around, travel, wire, middle = _three_rounds(s, travel, wire)
+    wire = limited(around, smooth(around, wire, config.smoothing), MARGIN * config.turn_limit)[middle]
+    travel = smooth(around, travel, config.smoothing)[middle]
     R = _frames(s, travel, wire) @ lean(config.work_angle, config.travel_angle)
     tip = points + (config.nominal_ctwd - config.ctwd) * R[:, :, 2]
     X_BT, at = interpolate_poses(Transform("BT", R, tip), config.step)
@@ -109,6 +113,16 @@ def _nodes(
     pieces = np.maximum(np.ceil(np.diff(s) / NODE * (1 - 1e-9)).astype(int), 1)
     at = np.concatenate([*(np.linspace(a, b, k, endpoint=False) for a, b, k in zip(s[:-1], s[1:], pieces, strict=True)), s[-1:]])
     return at, interpolate(s, points, at), unit(interpolate(s, travel, at)), unit(interpolate(s, one_sided(wire), at))
+
+
+def _three_rounds(
+    s: Float[ndarray, "n"], travel: Float[ndarray, "n 3"], wire: Float[ndarray, "n 3"]
+) -> tuple[Float[ndarray, "k"], Float[ndarray, "k 3"], Float[ndarray, "k 3"], slice]:
+    """A ring travelled three times, and which part is the middle round: what is smoothed there knows no end."""
+    n = len(s) - 1
+    around = np.concatenate([s[:-1] - s[-1], s[:-1], s + s[-1]])
+    travel, wire = (np.concatenate([v[:-1], v[:-1], v[:-1], v[:1]]) for v in (travel, wire))
+    return around, travel, wire, slice(n, 2 * n + 1)
 
 
 def _frames(s: Float[ndarray, "n"], travel: Float[ndarray, "n 3"], wire: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3 3"]:

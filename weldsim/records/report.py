@@ -11,8 +11,9 @@ class LineError:
 
     Attributes:
         mean, rms, p95, max: cross-track distance [m].
-        coverage: fraction of the known seam's length that the line covers.
-        start, end: distance of each end from the known end, along the seam [m]; positive = overshoot.
+        coverage: fraction of the known seam's length, without what was to be left out, that the line covers.
+        start, end: distance of each end from the one asked for, along the seam [m]; positive = overshoot. Of a ring, end is
+            the overlap.
         axis_median, axis_p95: angle between wire axis and the known bisector [rad].
         reference: which line of the groove it was measured against.
     """

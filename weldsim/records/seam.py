@@ -9,6 +9,8 @@ from numpy import ndarray
 
 from weldsim.records.checks import check_increasing, check_metres, check_unit, require, store
 
+JOINED = 1e-6  # [m] between the ends of a ring
+
 Reference = Literal["opening", "root", "gap_mid"]
 Joint = Literal["groove", "butt", "lap", "fillet", "saddle"]
 
@@ -29,7 +31,7 @@ class Seam:
         residual: rms distance of the data from the fitted cross-sections [m].
         confidence: 0 to 1.
         joint, reference: which kind of joint, and which line of it `points_B` follows.
-        closed: whether the last point joins the first.
+        closed: whether the seam is a ring: its last point then repeats its first.
     """
 
     points_B: Float[ndarray, "n 3"]
@@ -63,6 +65,8 @@ class Seam:
         if self.sigma is not None:
             store(self, "sigma", self.sigma, shape=(n,))
             require(bool((self.sigma >= 0).all()), self, "sigma", "negative standard deviation")
+        gap = float(np.linalg.norm(self.points_B[-1] - self.points_B[0])) if self.closed else 0.0
+        require(gap <= JOINED, self, "closed", f"the ends lie {1e3 * gap:.3g} mm apart; a ring's last point repeats its first")
         require(0.0 <= self.confidence <= 1.0, self, "confidence", f"{self.confidence} is outside 0 to 1")
 
     @property
@@ -159,3 +163,8 @@ class KnownSeam:
     def length(self) -> float:
         """Arc length of the opening [m]."""
         return float(self.s[-1] - self.s[0])
+
+    @property
+    def closed(self) -> bool:
+        """Whether the seam is a ring: its last point repeats its first."""
+        return bool(np.linalg.norm(self.opening_B[-1] - self.opening_B[0]) <= JOINED)

@@ -46,6 +46,9 @@ def scene(
         data.append(_line("centre line", seam.points_B, CENTRE, 3, legend=i == 0))
     for i, path in enumerate(path for path in paths if path is not None):
         data.append(_line("torch path", path.X_BT.p[path.weld], SEAM, 7, legend=i == 0))
+        for name, end, symbol in (("start", 0, "circle"), ("end", -1, "square-open")):
+            place = path.X_BT.p[path.weld][[end]]
+            data.append(_dots(name, place, {"size": 7 + (end < 0) * 3, "color": SEAM, "symbol": symbol}) | {"showlegend": i == 0})
         wires = np.full((len(torch_axes(path)), 3, 3), np.nan)
         wires[:, :2] = torch_axes(path)
         data.append(_line("wire", wires.reshape(-1, 3), WIRE, 4, legend=i == 0))

@@ -6,7 +6,7 @@ error. Lines are resampled evenly before statistics are taken, so figures are we
 on how a line was sampled. No figure of seam error means anything without its reference: every function says which.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -81,8 +81,10 @@ def offsets(points: Float[ndarray, "m 3"], line: Float[ndarray, "n 3"], ends: Fl
 
 
 def known_offsets(points_B: Float[ndarray, "m 3"], known: KnownSeam, reference: Reference = "opening") -> Offsets:
-    """Offsets of points from the known seam, with its tangents in closed form beyond the ends."""
-    return offsets(points_B, known_line(known, reference), known.tangents_B[[0, -1]])
+    """Offsets of points from the known seam, with its tangents in closed form beyond the ends; a ring has none."""
+    line = known_line(known, reference)
+    found = offsets(points_B, line, known.tangents_B[[0, -1]])
+    return replace(found, s=found.s % arc_length(line)[-1]) if known.closed else found
 
 
 def across(found: Offsets, known: KnownSeam, reference: Reference = "opening") -> Float[ndarray, "m"]:
@@ -97,54 +99,73 @@ def line_error(
     wire_axes_B: Float[ndarray, "n 3"],
     known: KnownSeam,
     reference: Reference = "opening",
+    trims: tuple[Metre, Metre] = (0.0, 0.0),
 ) -> LineError:
     """How far a line is from the known seam, whichever way it runs.
 
     Cross-track distance is the perpendicular distance in space (see `offsets`); mean, rms, p95 and max are over samples
-    every 0.5 mm. Coverage is the fraction of the known length whose perpendicular foot the line passes within 3 mm.
-    End errors are along the seam, at the known seam's start and end, positive where the line runs on. The axis angle is
-    between wire axis and the known inward bisector at the foot.
+    every 0.5 mm. Coverage is the fraction of the length asked for (the known one without the trims) whose perpendicular
+    foot the line passes within 3 mm. End errors are along the seam, at the start and end of what was asked for, positive
+    where the line runs on; a ring has no known start, and its end error is the overlap. The axis angle is between wire
+    axis and the known inward bisector at the foot.
 
     Args:
         points_B: the line [m], two points or more.  wire_axes_B: unit, towards the work.
         known: the true seam.  reference: which line of it is compared.
+        trims: length left out on purpose at the line's start and end, as it runs [m].
     """
     points, axes = _even(points_B, wire_axes_B)
     line = known_line(known, reference)
     found = known_offsets(points, known, reference)
-    if found.s[-1] < found.s[0]:
-        points, axes = points[::-1], axes[::-1]
-        found = Offsets(s=found.s[::-1], distance=found.distance[::-1], vectors=found.vectors[::-1])
     s = arc_length(line)
-    bisectors = unit(interpolate(s, known.bisectors_B, found.s))
+    length = float(s[-1])
+    if known.closed:
+        found = replace(found, s=np.unwrap(found.s, period=length))
+    if found.s[-1] < found.s[0]:
+        points, axes, trims = points[::-1], axes[::-1], (trims[1], trims[0])
+        found = Offsets(s=found.s[::-1], distance=found.distance[::-1], vectors=found.vectors[::-1])
+    low, high = (0.0, length - sum(trims)) if known.closed else (trims[0], length - trims[1])
+    first, last = float(found.s[0]), float(found.s[-1])
+    bisectors = unit(interpolate(s, known.bisectors_B, found.s % length if known.closed else found.s))
     angle = np.arctan2(np.linalg.norm(np.cross(axes, bisectors), axis=1), np.einsum("ij,ij->i", axes, bisectors))
     return LineError(
         mean=float(found.distance.mean()),
         rms=float(np.sqrt(np.mean(found.distance**2))),
         p95=float(np.percentile(found.distance, 95)),
         max=float(found.distance.max()),
-        coverage=coverage(found, float(s[-1])),
-        start=float(-found.s[0]),
-        end=float(found.s[-1] - s[-1]),
+        coverage=coverage(found, low, high, ring=length if known.closed else None),
+        start=0.0 if known.closed else low - first,
+        end=last - first - high if known.closed else last - high,
         axis_median=float(np.median(angle)),
         axis_p95=float(np.percentile(angle, 95)),
         reference=reference,
     )
 
 
-def coverage(found: Offsets, length: float, near: Metre = NEAR) -> float:
-    """The fraction of a line's `length` [m] that consecutive samples, both within `near`, sweep with their feet."""
+def coverage(found: Offsets, low: Metre, high: Metre, *, ring: Metre | None = None, near: Metre = NEAR) -> float:
+    """The fraction of a line between arc lengths `low` and `high` that consecutive samples, both within `near`, sweep.
+
+    On a ring of length `ring` it does not matter where: the length swept is compared with `high` - `low`.
+    """
+    if high <= low:
+        return 1.0
     close = (found.distance[:-1] <= near) & (found.distance[1:] <= near)
     # A jump of the foot (a line that cuts across a bend) covers nothing in between.
     close &= np.abs(np.diff(found.s)) <= 4 * STEP
-    low = np.clip(np.minimum(found.s[:-1], found.s[1:])[close], 0.0, length)
-    high = np.clip(np.maximum(found.s[:-1], found.s[1:])[close], 0.0, length)
-    if len(low) == 0:
+    start, end = (pick(found.s[:-1], found.s[1:])[close] for pick in (np.minimum, np.maximum))
+    if ring is None:
+        start, end = np.clip(start, low, high), np.clip(end, low, high)
+    else:
+        rounds = np.floor(start / ring) * ring
+        start, end = start - rounds, end - rounds
+        over = end > ring
+        start, end = np.append(start, np.zeros(int(over.sum()))), np.append(np.minimum(end, ring), end[over] - ring)
+    if len(start) == 0:
         return 0.0
-    order = np.argsort(low)
-    low, high = low[order], np.maximum.accumulate(high[order])
-    gaps = np.clip(low[1:] - high[:-1], 0.0, None).sum()
-    return float(np.clip((high[-1] - low[0] - gaps) / length, 0.0, 1.0))
+    order = np.argsort(start)
+    start, end = start[order], np.maximum.accumulate(end[order])
+    gaps = np.clip(start[1:] - end[:-1], 0.0, None).sum()
+    return float(np.clip((end[-1] - start[0] - gaps) / (high - low), 0.0, 1.0))
 
 
 def match_seams(found: tuple[Seam, ...], known: tuple[KnownSeam, ...], within: Metre = MATCH, share: float = 0.5) -> SeamMatch:

@@ -114,7 +114,9 @@ def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFind
         )
         axes.scatter(*wires[:, 0].T, s=9, color=WIRE, zorder=3)
         _trace(axes, X_SB, path.X_BT.p[path.weld], SEAM, 2.4, "-", "torch path" if i == 0 else None)
-        _number(axes, X_SB, path.X_BT.p[path.weld], f"{i + 1}")
+        tip = path.X_BT.p[path.weld]
+        _ends(axes, X_SB, tip, legend=i == 0)
+        _number(axes, X_SB, tip, f"{i + 1}")
     axes.set_xlabel("along [mm]", color=INK)
     axes.set_ylabel("across [mm]", color=INK)
     axes.set_aspect("equal")
@@ -141,6 +143,14 @@ def _number(axes: Axes, X_SB: Transform, points_B: ndarray, text: str) -> None:
     """`text` beside the first point of a line."""
     start = 1e3 * X_SB.points(points_B[:1])[0]
     axes.annotate(text, start[:2], xytext=(-14, 8), textcoords="offset points", color=SEAM, weight="bold", fontsize=13)
+
+
+def _ends(axes: Axes, X_SB: Transform, points_B: ndarray, *, legend: bool) -> None:
+    """A disc where the torch starts and a square where it ends; around a ring the disc lies in the square."""
+    ends = 1e3 * X_SB.points(points_B[[0, -1]])
+    for name, place, mark, size, front in (("start", ends[0], "o", 26, 6), ("end", ends[1], "s", 64, 5)):
+        look = {"facecolor": "white", "edgecolor": SEAM, "linewidth": 1.6, "zorder": front}
+        axes.scatter(place[0], place[1], s=size, marker=mark, label=name if legend else None, **look)
 
 
 def _trace(axes: Axes, X_SB: Transform, points_B: ndarray, colour: str, width: float, style: str, label: str | None) -> None:

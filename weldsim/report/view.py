@@ -125,7 +125,7 @@ def error_lines(
         return {}
     seam = findings.seams[welded]
     weld = path.weld
-    claimed = None if seam.sigma is None else np.interp(path.s[weld] - path.s[weld.start], seam.s, seam.sigma)
+    claimed = None if path.sigma is None else path.sigma[weld]
     out = {"plan": _error_line(path.X_BT.p[weld], partner, seam.reference, claimed)}
     if log is not None and log.arc_on.any():
         out["executed"] = _error_line(thinned(log)[0], partner, seam.reference, None)

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray
 
+from weldsim.quantity import Metre
 from weldsim.records import ExecutionLog, KnownSeam, LineError, Seam, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import ReportConfig, checks
 from weldsim.report.metrics import line_error, match_seams, region_overlap, sigma_coverage
@@ -28,6 +29,7 @@ def weld_report(
     true_region: Bool[ndarray, "n"] | None = None,
     welded: int = 0,
     unplanned: tuple[str, ...] = (),
+    trims: tuple[Metre, Metre] = (0.0, 0.0),
     timing: dict[str, float] | None = None,
     seed: int = 0,
     config_digest: str = "",
@@ -43,6 +45,7 @@ def weld_report(
         true_region: for each point of the cloud, whether it lies in a groove; None when unknown.
         welded: which of the paths is judged.
         unplanned: found seams without a path, a clause each.
+        trims: length left out on purpose at the start and end of the weld [m]; it is not missed.
         timing: seconds a stage.  seed, config_digest: what it ran with.
         config: the limits.
 
@@ -64,7 +67,7 @@ def weld_report(
         versions=versions(),
     )
     if known is not None:
-        draft = _against_known(draft, findings, paths, log, known, welded, failures)
+        draft = _against_known(draft, findings, paths, log, known, welded, trims, failures)
     elif not findings.seams:
         failures.append("no seam was found")
     path = paths[welded] if welded < len(paths) else None
@@ -83,6 +86,7 @@ def _against_known(
     log: ExecutionLog | None,
     known: tuple[KnownSeam, ...],
     welded: int,
+    trims: tuple[Metre, Metre],
     failures: list[str],
 ) -> WeldReport:
     """The report with the figures that need the true seams; seams that were missed are added to `failures`."""
@@ -96,8 +100,8 @@ def _against_known(
     seam = findings.seams[welded]
     return replace(
         report,
-        plan=path_error(path, partner, seam),
-        executed=None if log is None else executed_error(log, partner, seam),
+        plan=path_error(path, partner, seam, trims),
+        executed=None if log is None else executed_error(log, partner, seam, trims),
         sigma_coverage=None if seam.sigma is None else sigma_coverage(seam.points_B, seam.sigma, partner, seam.reference),
     )
 
@@ -118,16 +122,16 @@ def _against_plan(report: WeldReport, path: TorchPath, log: ExecutionLog, failur
     )
 
 
-def path_error(path: TorchPath, known: KnownSeam, seam: Seam) -> LineError:
+def path_error(path: TorchPath, known: KnownSeam, seam: Seam, trims: tuple[Metre, Metre] = (0.0, 0.0)) -> LineError:
     """The planned torch tip and wire axis against the known seam, at the seam's own reference."""
     X = path.X_BT[path.weld]
-    return line_error(X.p, X.R[:, :, 2], known, seam.reference)
+    return line_error(X.p, X.R[:, :, 2], known, seam.reference, trims)
 
 
-def executed_error(log: ExecutionLog, known: KnownSeam, seam: Seam) -> LineError | None:
+def executed_error(log: ExecutionLog, known: KnownSeam, seam: Seam, trims: tuple[Metre, Metre] = (0.0, 0.0)) -> LineError | None:
     """The measured torch tip and wire axis against the known seam, with the arc on; None when it never moved."""
     tip, wire = thinned(log)
-    return line_error(tip, wire, known, seam.reference) if len(tip) > 1 else None
+    return line_error(tip, wire, known, seam.reference, trims) if len(tip) > 1 else None
 
 
 def versions() -> dict[str, str]:

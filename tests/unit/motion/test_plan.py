@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 
 from tests.torch_paths import START, flat_curve, random_path, torch_path
+from weldsim.curves import arc_length
 from weldsim.errors import MotionError, UnreachableError
 from weldsim.frames import Transform
 from weldsim.kinematics import inverse, torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.mounts import X_FT
-from weldsim.records import JointTrajectory, Segment, TorchPath
+from weldsim.path.plan import plan_path
+from weldsim.records import JointTrajectory, Seam, Segment, TorchPath
 
 MIDDLE = np.array([0.0, -0.48, 0.06])
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -211,3 +213,17 @@ def test_all_blocked_says_by_what() -> None:
         plan_motion(path, START, blocked=lambda _: "torch touches clamp")
     with pytest.raises(MotionError, match="torch touches clamp"):
         plan_motion(path, START, blocked=lambda q: "torch touches clamp" if np.abs(q - START).max() > 0.5 else None)
+
+
+def test_the_arm_goes_around_a_ring() -> None:
+    angle = np.linspace(0, 2 * np.pi, 181)
+    points = np.array([0.0, -0.45, 0.1]) + 0.06 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points[-1] = points[0]
+    travel = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    up = np.tile([0.0, 0.0, 1.0], (len(angle), 1))
+    seam = Seam(points_B=points, s=arc_length(points), tangents_B=travel, normals_B=up, closed=True)
+    motion = plan_motion(plan_path(seam), START)
+    weld = _is(motion.trajectory, Segment.WELD)
+    assert motion.position_error < 0.05e-3
+    # Rotation about the wire is free, so no joint is wound up on the way around.
+    assert np.abs(motion.trajectory.q[weld][-1] - motion.trajectory.q[weld][0]).max() < 0.02
