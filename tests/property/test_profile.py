@@ -67,7 +67,6 @@ def test_the_seam_moves_with_the_cell_under_noise(curve) -> None:
     assert movement(seam, X.inverse().points(found[0].points_B)) < 0.6e-3
 
 
-@pytest.mark.xfail(strict=True, reason="a pure shift moves the seam of a noisy cloud by 0.13 mm; the cause is not found")
 def test_a_shifted_cell_gives_the_shifted_seam() -> None:
     made, seam = scanned("s", "d415")
     X = Transform("BB", np.eye(3), np.array([0.25, -0.125, 0.0625]))  # exact in binary

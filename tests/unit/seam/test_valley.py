@@ -29,7 +29,7 @@ def sheet(
 
 def lines(cloud: PointCloud, config: ProfileConfig = CONFIG) -> list:
     chart = make_chart(cloud)
-    return [line for line in trace_valleys(chart, valley_images(chart, config), config) if line.level >= 0.5]
+    return [line for line in trace_valleys(valley_images(chart, config), config) if line.level >= 0.5]
 
 
 def v_groove(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ camera averages over windows of just this image; so the chart's height is z0^2 /
 Without a viewpoint the chart is orthographic along the cloud's thinnest direction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,6 +17,77 @@ from weldsim.records import PointCloud
 
 COARSE_PITCH = 0.0013  # [m] wanted size of a chart cell on the surface
 MAX_CELLS = 1_500_000
+BLOCKS = 128  # along the longer side, in which the density of the points is counted
+FEWEST_BLOCKS = 30
+SPARSE_SHARE = 0.1  # of the blocks are sparser than what counts as sparse
+CELL_SPACINGS = 0.8  # size of a cell over the usual spacing of the points
+SPARSE = 0.6  # spacing over cell size from which on cells stay empty by chance
+WIDEST_GAP = 1.5  # radius, in spacings, of the widest gap that randomly sampled surfaces leave (one in a thousand)
+FILL_SIGMA = 0.6  # of the weights with which heights between such points are averaged, in spacings
+SLOPE_SIGMA = 1.5  # the same for slopes
+
+
+@dataclass(frozen=True, eq=False)
+class Scattered:
+    """The points of a sparse chart, summed cell by cell.
+
+    Attributes:
+        number: (h, w) points in each cell.
+        height: (h, w) sum of their chart heights [m].
+        u, v: (h, w) sums of their offsets from the cells' centres [cells].
+        spacing: between the points where they are sparse [cells].
+    """
+
+    number: Float[ndarray, "h w"]
+    height: Float[ndarray, "h w"]
+    u: Float[ndarray, "h w"]
+    v: Float[ndarray, "h w"]
+    spacing: float
+
+    def levelled(self, along_rows: float, along_columns: float) -> Float[ndarray, "h w"]:
+        """Height at each cell's centre above a plane through the chart's corner with these slopes [m/cell]: the mean of
+        the points around, weighted by distance. A mean of heights above a plane is never above all of them."""
+        v, u = np.indices(self.number.shape)
+        above = self.height - along_columns * (self.u + self.number * u) - along_rows * (self.v + self.number * v)
+        return self._mean(above)
+
+    def _mean(self, sums: Float[ndarray, "h w"]) -> Float[ndarray, "h w"]:
+        """Mean over the points around each cell [unit of `sums`], 0 where there is none."""
+        total, number = (cv2.GaussianBlur(one, (0, 0), FILL_SIGMA * self.spacing) for one in (sums, self.number))
+        return np.where(number > 1e-3, total / np.maximum(number, 1e-3), 0.0)
+
+    def heights(self, squares: Float[ndarray, "5 h w"]) -> tuple[Float[ndarray, "h w"], Bool[ndarray, "h w"]]:
+        """Heights at the cells' centres, and the cells that have one.
+
+        A point lies anywhere in its cell, and on a tilted surface that alone looks like noise as large as the cell; and
+        cells stay empty by chance. So each point is carried to the centre with the slope of a wider window. A gap wider
+        than a sampled surface leaves by chance stays empty.
+
+        Args:
+            squares: over the points of each cell, the sums of u^2, v^2, u v, u h, v h.
+        """
+        reach = max(1, round(WIDEST_GAP * self.spacing))
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+        known = cv2.copyMakeBorder((self.number > 0).astype(np.uint8), reach, reach, reach, reach, cv2.BORDER_CONSTANT, value=0)
+        valid = cv2.morphologyEx(known, cv2.MORPH_CLOSE, disc)[reach:-reach, reach:-reach] > 0
+        # Sums about the cells' centres, as sums about the chart's corner, whose spread a window can tell.
+        v0, u0 = np.indices(self.number.shape).astype(float)
+        n, h, u, v = self.number, self.height, self.u + u0 * self.number, self.v + v0 * self.number
+        uu, vv, uv, uh, vh = squares
+        uu, vv = uu + 2 * u0 * self.u + u0**2 * n, vv + 2 * v0 * self.v + v0**2 * n
+        uv = uv + u0 * self.v + v0 * self.u + u0 * v0 * n
+        uh, vh = uh + u0 * h, vh + v0 * h
+        wide = SLOPE_SIGMA * self.spacing
+        n, h, u, v, uu, vv, uv, uh, vh = (cv2.GaussianBlur(one, (0, 0), wide) for one in (n, h, u, v, uu, vv, uv, uh, vh))
+        n = np.maximum(n, 1e-9)
+        loose = 0.05 * n * self.spacing**2  # a few points in a row say nothing about the slope across them
+        suu, svv, suv = uu - u * u / n + loose, vv - v * v / n + loose, uv - u * v / n
+        suh, svh = uh - u * h / n, vh - v * h / n
+        det = suu * svv - suv**2
+        slope_u, slope_v = (svv * suh - suv * svh) / det, (suu * svh - suv * suh) / det
+        away_u, away_v = (self._mean(a + at * self.number) - at for a, at in ((self.u, u0), (self.v, v0)))
+        image = self._mean(self.height) - slope_u * away_u - slope_v * away_v
+        return np.where(valid, image, 0.0), valid
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +102,7 @@ class Chart:
     depth0: mean depth [m]; infinity-like charts are orthographic when `perspective` is false.
     corner: image coordinates of cell (0, 0)'s corner, in units of depth ratio (perspective) or metres.
     step: cell size in those units.
+    scattered: where the points are so sparse that their places within the cells matter; None where they are not.
     """
 
     height: Float[ndarray, "h w"]
@@ -43,6 +115,19 @@ class Chart:
     corner: Float[ndarray, "2"]
     step: float
     perspective: bool
+    scattered: Scattered | None = None
+
+    def based_at(self, depth: float) -> "Chart":
+        """The same chart with heights and lengths true at another depth [m] from the viewpoint."""
+        if not self.perspective:
+            return self
+        ratio = depth / self.depth0
+        height = np.where(self.valid, ratio**2 * (self.height + self.depth0) - depth, 0.0)
+        scattered = self.scattered
+        if scattered is not None:
+            total = ratio**2 * (scattered.height + scattered.number * self.depth0) - scattered.number * depth
+            scattered = replace(scattered, height=total)
+        return replace(self, height=height, pitch=self.step * depth, depth0=depth, scattered=scattered)
 
     def to_space(self, u: Float[ndarray, "k"], v: Float[ndarray, "k"], height: Float[ndarray, "k"]) -> Float[ndarray, "k 3"]:
         """Points in the cloud's frame at cell coordinates (u, v) (cell centres at whole numbers) and chart height."""
@@ -57,29 +142,51 @@ class Chart:
 
 
 def make_chart(cloud: PointCloud) -> Chart:
-    """The chart of a cloud, seen from its (mean) viewpoint or along its thinnest direction."""
-    points = cloud.points
-    middle = points.mean(axis=0)
-    perspective = len(cloud.viewpoints) == 1
+    """The chart of a whole cloud, seen from its (mean) viewpoint or along its thinnest direction."""
+    middle = cloud.points.mean(axis=0)
+    if len(cloud.viewpoints) == 1:
+        return chart_from(cloud.points, cloud.viewpoints[0])
     if len(cloud.viewpoints):
-        origin = cloud.viewpoints.mean(axis=0)
-        forward = unit(middle - origin)
-    else:
-        forward = -_thin_direction(cloud)
-        origin = middle - forward
-    if not perspective:
-        origin = middle - forward * np.linalg.norm(middle - origin)
-    axes = _axes(forward)
-    local = (points - origin) @ axes.T
+        away = middle - cloud.viewpoints.mean(axis=0)
+        return chart_along(cloud.points, unit(away), float(np.linalg.norm(away)))
+    return chart_along(cloud.points, -_thin_direction(cloud))
+
+
+def chart_from(points: Float[ndarray, "n 3"], viewpoint: Float[ndarray, "3"]) -> Chart:
+    """The chart of points as a camera at `viewpoint` [m] sees them."""
+    axes = _axes(unit(points.mean(axis=0) - viewpoint))
+    local = (points - viewpoint) @ axes.T
     z = local[:, 2]
     front = z > 1e-3
     depth0 = float(np.median(z[front])) if front.any() else 1.0
     safe = np.where(front, z, depth0)
-    uv = local[:, :2] / safe[:, None] if perspective else local[:, :2].copy()
-    height = depth0**2 / safe - depth0 if perspective else depth0 - z
+    return _chart(local[:, :2] / safe[:, None], depth0**2 / safe - depth0, front, axes, viewpoint, depth0, perspective=True)
+
+
+def chart_along(points: Float[ndarray, "n 3"], forward: Float[ndarray, "3"], distance: float = 1.0) -> Chart:
+    """The orthographic chart of points seen along `forward` (3,) unit, from a plane `distance` [m] before their middle."""
+    axes = _axes(forward)
+    origin = points.mean(axis=0) - distance * forward
+    local = (points - origin) @ axes.T
+    front = local[:, 2] > 1e-3
+    depth0 = float(np.median(local[front, 2])) if front.any() else 1.0
+    return _chart(local[:, :2], depth0 - local[:, 2], front, axes, origin, depth0, perspective=False)
+
+
+def _chart(
+    uv: Float[ndarray, "n 2"],
+    height: Float[ndarray, "n"],
+    front: Bool[ndarray, "n"],
+    axes: Float[ndarray, "3 3"],
+    origin: Float[ndarray, "3"],
+    depth0: float,
+    *,
+    perspective: bool,
+) -> Chart:
+    """The chart of points at image coordinates `uv` with chart heights [m]; those not in `front` are left out."""
     scale = depth0 if perspective else 1.0
-    step = _cell_size(uv, scale)
     low, high = np.quantile(uv, [0.0005, 0.9995], axis=0)
+    step, sparse = _cell_size(uv, low, high, scale)
     corner = low - 2 * step
     shape = np.ceil((high + 2 * step - corner) / step).astype(int)
     index = np.floor((uv - corner) / step).astype(np.int64)
@@ -90,8 +197,19 @@ def make_chart(cloud: PointCloud) -> Chart:
     total = np.bincount(cell[inside], weights=height[inside], minlength=size)
     image = np.divide(total, count, out=np.zeros(size), where=count > 0).reshape(shape[1], shape[0])
     valid = (count > 0).reshape(shape[1], shape[0])
-    image, valid = _fill_pinholes(image, valid)
-    return Chart(image, valid, cell, step * scale, axes, origin, depth0, corner, step, perspective)
+    scattered = None
+    if sparse > SPARSE * step:
+        u, v = ((uv - corner) / step - index - 0.5)[inside].T
+        h = height[inside]
+        sums = [
+            np.bincount(cell[inside], weights=a, minlength=size).reshape(image.shape)
+            for a in (u, v, u * u, v * v, u * v, u * h, v * h)
+        ]
+        scattered = Scattered(count.reshape(image.shape).astype(float), total.reshape(image.shape), sums[0], sums[1], sparse / step)
+        image, valid = scattered.heights(np.stack(sums[2:]))
+    else:
+        image, valid = _fill_pinholes(image, valid)
+    return Chart(image, valid, cell, step * scale, axes, origin, depth0, corner, step, perspective, scattered)
 
 
 def _thin_direction(cloud: PointCloud) -> Float[ndarray, "3"]:
@@ -119,15 +237,24 @@ def _axes(forward: Float[ndarray, "3"]) -> Float[ndarray, "3 3"]:
     return np.stack([np.cross(v, forward), v, forward])
 
 
-def _cell_size(uv: Float[ndarray, "n 2"], scale: float) -> float:
-    """Cell size in units of uv: COARSE_PITCH, or coarser where the cloud is sparser."""
-    low, high = np.quantile(uv, [0.001, 0.999], axis=0)
+def _cell_size(uv: Float[ndarray, "n 2"], low: Float[ndarray, "2"], high: Float[ndarray, "2"], scale: float) -> tuple[float, float]:
+    """Cell size, COARSE_PITCH or coarser where the cloud is sparser, and the spacing of points where they are sparse, both
+    in units of uv.
+
+    A table seen at a flat angle is dense in the chart: it must not decide for a part that is not. So the spacing is that
+    of a lower quantile of the blocks that lie wholly within the data.
+    """
     extent = np.maximum(high - low, 1e-9)
-    coarse = max(float(extent.max()) / 128, 1e-12)
-    occupied = len(np.unique(np.floor((uv - low) / coarse).astype(np.int64) @ np.array([1, 100_003])))
-    spacing = np.sqrt(occupied * coarse**2 / len(uv))
-    step = max(COARSE_PITCH / scale, 1.5 * spacing)
-    return float(max(step, np.sqrt(np.prod(extent + 4 * step) / MAX_CELLS)))
+    block = max(float(extent.max()) / BLOCKS, 1e-12)
+    at = np.clip(np.floor((uv - low) / block).astype(np.int64), -1, BLOCKS) + 1
+    count = np.bincount(at[:, 0] * (BLOCKS + 2) + at[:, 1], minlength=(BLOCKS + 2) ** 2).reshape(BLOCKS + 2, BLOCKS + 2)
+    within = cv2.erode((count > 0).astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
+    spacing = sparse = block * float(np.sqrt(np.count_nonzero(count) / len(uv)))
+    if np.count_nonzero(within) >= FEWEST_BLOCKS:
+        usual, low_count = np.quantile(count[within], [0.5, SPARSE_SHARE])
+        spacing, sparse = block / float(np.sqrt(usual)), block / float(np.sqrt(low_count))
+    step = max(COARSE_PITCH / scale, CELL_SPACINGS * spacing)
+    return float(max(step, np.sqrt(np.prod(extent + 4 * step) / MAX_CELLS))), sparse
 
 
 def _fill_pinholes(image: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"]) -> tuple[Float[ndarray, "h w"], Bool[ndarray, "h w"]]:

@@ -38,7 +38,7 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     threshold = Threshold(name="valley depth along 25 mm", value=images[0].threshold, unit="m", noise=images[0].noise)
     accepted: list[tuple[Fit, tuple[float, float], float]] = []
     rejected: list[Rejection] = []
-    for coarse in trace_valleys(chart, images, config):
+    for coarse in trace_valleys(images, config):
         line = coarse.points
         if coarse.level < MIN_LEVEL:
             rejected.append(_rejection(line, f"surface at one level on both sides over only {coarse.level:.0%} of it"))
@@ -103,10 +103,12 @@ def _surroundings(chart: Chart, line: Float[ndarray, "k 3"], most: int) -> Int[n
     far[row, column] = 0
     near = cv2.distanceTransform(far, cv2.DIST_L2, 3) < SURROUNDINGS / chart.pitch
     index = np.flatnonzero(np.concatenate([near.ravel(), [False]])[chart.cell])
-    # A fixed-seed random thinning: an even stride would beat against the rows of a depth image.
     if len(index) <= most:
         return index
-    return np.sort(np.random.default_rng(0).choice(index, most, replace=False))
+    # Random: an even stride would beat against the rows of a depth image. By a rank that each point of the cloud keeps,
+    # whatever else is near: with one point more or less around a line, a draw among them would be another sample.
+    rank = np.random.default_rng(0).random(len(chart.cell))[index]
+    return index[np.sort(np.argpartition(rank, most)[:most])]
 
 
 def _mark_region(

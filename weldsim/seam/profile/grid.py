@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
@@ -10,6 +11,8 @@ from weldsim.seam.profile.parent import Parent
 from weldsim.seam.profile.rail import Rail, Strip
 
 DX = 0.0005  # [m] lateral size of a cell
+DENSE = 0.25  # share of cells with points from which on a cloud is dense
+WIDEST = 4.0  # times as many stations as in a dense cloud are looked at together, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +28,30 @@ class Grid:
     depth: Float[ndarray, "m w"]
     count: Float[ndarray, "m w"]
     shear: Float[ndarray, "m"]
+
+    @property
+    def sparsity(self) -> float:
+        """How many times as many stations must be looked at together as in a dense cloud to hold as many points, 1 to WIDEST."""
+        share = float(np.quantile(np.isfinite(self.depth).mean(axis=1), 0.6))
+        return float(np.clip(DENSE / max(share, 1e-6), 1.0, WIDEST))
+
+    def filled(self) -> Float[ndarray, "m w"]:
+        """Depths with empty cells taken from the stations around, where the cloud is sparse, then from their neighbours
+        along each row; rows without any are 0."""
+        depth = self.depth
+        reach = round(2 * (self.sparsity - 1))
+        if reach > 0:
+            kernel = np.ones((2 * reach + 1, 1))
+            total = cv2.filter2D(np.where(np.isfinite(depth), depth * self.count, 0.0), -1, kernel, borderType=cv2.BORDER_CONSTANT)
+            number = cv2.filter2D(self.count, -1, kernel, borderType=cv2.BORDER_CONSTANT)
+            around = np.divide(total, number, out=np.full(depth.shape, np.nan), where=number > 0.5)
+            depth = np.where(np.isfinite(depth), depth, around)
+        out = np.zeros_like(depth)
+        for row, values in enumerate(depth):
+            known = np.isfinite(values)
+            if known.any():
+                out[row] = np.interp(self.x, self.x[known], values[known])
+        return out
 
 
 def ray_coordinates(strip: Strip, parent: Parent) -> tuple[Float[ndarray, "k"], Float[ndarray, "k"], Float[ndarray, "k"]]:

@@ -209,7 +209,7 @@ def _first_section(
     grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]
 ) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
     """A first guess: each station's centroid, smoothed, and the mean profile's width and depth."""
-    filled = np.maximum(_bridged(grid), 0.0)
+    filled = np.maximum(grid.filled(), 0.0)
     kernel = np.ones(9) / 9
     smoothed = np.apply_along_axis(lambda column: np.convolve(column, kernel, mode="same"), 0, filled)
     middle = np.abs(grid.x) < 0.016
@@ -234,16 +234,6 @@ def _first_section(
     width = float(np.count_nonzero(mean[middle] > 0.5 * depth) * (grid.x[1] - grid.x[0]))
     section = Section(middle=0.0, width=1.4 * width, depth=1.15 * depth, floor=0.1, lean=0.0, blur=0.003)
     return section, offset, seen
-
-
-def _bridged(grid: Grid) -> Float[ndarray, "m w"]:
-    """The grid's depths with empty cells filled along each row from their neighbours, empty rows 0."""
-    out = np.zeros_like(grid.depth)
-    for row, values in enumerate(grid.depth):
-        known = np.isfinite(values)
-        if known.any():
-            out[row] = np.interp(grid.x, grid.x[known], values[known])
-    return out
 
 
 def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, first: bool) -> tuple[Section, float]:

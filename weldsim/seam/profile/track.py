@@ -55,10 +55,11 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     depth = np.where(known, grid.depth, 0.0)
     terms = [slope * slope, model * model, slope * (depth - model), model * depth]
     each = np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)
-    ss, mm, sd, _ = _window_sum(each, LATERAL_REACH).T
+    least = round(LATERAL_REACH * grid.sparsity)
+    ss, mm, sd, _ = _window_sum(each, least).T
     full = np.quantile(mm, 0.8)
     enough = (mm > 0.35 * full) & (ss > 0)
-    amplitude, local = _amplitude(each, enough, flanked)
+    amplitude, local = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
@@ -72,12 +73,12 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
 
 
 def _amplitude(
-    each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked: Bool[ndarray, "m"]
+    each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked: Bool[ndarray, "m"], least: int
 ) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:
     """Apparent depth over the section's at each station, over the shortest window that shows it clearly, and over the
     shortest of all."""
     looks = []
-    for reach in AMPLITUDE_REACHES:
+    for reach in (least, *(reach for reach in AMPLITUDE_REACHES if reach > least)):
         _, mm, _, md = _window_sum(each, reach).T
         looks.append(np.where(enough, md / np.maximum(mm, 1e-18), np.nan))
         core = looks[-1][enough & flanked]

@@ -17,6 +17,7 @@ from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.chart import Chart
 
 MAX_LINES = 16
+MOST_BRANCHES = 12  # of one valley that are traced
 LINE = 0.025  # [m] length over which a valley is averaged along itself
 MODE_REACH = 0.35  # slopes this far from a mode, either way, belong to it
 MODE_SHARE = 0.10  # of the cells that a slope must have to get a valley image of its own
@@ -27,6 +28,7 @@ FAR = 10.0  # [m] stands for "no material" in the closing
 @dataclass(frozen=True, eq=False)
 class ValleyImage:
     """Attributes:
+    chart: with heights and lengths true at the usual depth of this slope.
     depth: (h, w) how far the closed surface lies above the measured one [m], 0 where not valid.
     lined: (h, w) the same averaged along the best of twelve short straight lines through each cell [m].
     lid: (h, w) the closed surface [m, chart height]: the parent surface across a groove.
@@ -35,6 +37,7 @@ class ValleyImage:
     noise: robust standard deviation of `lined` over the chart [m].
     """
 
+    chart: Chart
     depth: Float[ndarray, "h w"]
     lined: Float[ndarray, "h w"]
     lid: Float[ndarray, "h w"]
@@ -54,7 +57,10 @@ def valley_images(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> l
     images = []
     for mode in _slope_modes(slope[chart.valid][::3]):
         within = chart.valid & (np.abs(slope - mode).max(axis=-1) < MODE_REACH)
-        images.append(_valley_image(chart, mode, within, config, factor))
+        # A table far behind the part must not decide what a millimetre is: a groove would seem wider than it is.
+        usual = chart.depth0**2 / (chart.depth0 + float(np.median(chart.height[within]))) if within.any() else chart.depth0
+        ratio = usual / chart.depth0
+        images.append(_valley_image(chart.based_at(usual), mode * ratio, within, config, factor))
     return images
 
 
@@ -65,7 +71,11 @@ def _valley_image(
     valid = chart.valid
     h, w = valid.shape
     plane = chart.pitch * (slope[0] * np.arange(h)[:, None] + slope[1] * np.arange(w)[None, :])
-    flat = _without_spikes(chart.height - plane, valid)
+    if chart.scattered is None:
+        flat = chart.height - plane
+    else:
+        flat = np.where(valid, chart.scattered.levelled(*(chart.pitch * slope)), 0.0)
+    flat = _without_spikes(flat, valid)
     sigma = 0.0013 / chart.pitch
     weight = cv2.GaussianBlur(valid.astype(np.float64), (0, 0), sigma)
     smooth = cv2.GaussianBlur(np.where(valid, flat, 0.0), (0, 0), sigma) / np.maximum(weight, 1e-6)
@@ -85,7 +95,7 @@ def _valley_image(
     threshold = max(middle + config.detection_factor * noise, 0.6 * config.min_depth) * factor
     low = max(middle + 0.55 * config.detection_factor * noise, 0.3 * config.min_depth) * factor
     around = cv2.morphologyEx(within.astype(np.uint8), cv2.MORPH_CLOSE, disc) > 0  # with the grooves that cross it
-    return ValleyImage(depth, lined, np.where(valid, lid, smooth) + plane, around & valid, threshold, low, noise)
+    return ValleyImage(chart, depth, lined, np.where(valid, lid, smooth) + plane, around & valid, threshold, low, noise)
 
 
 def _along_lines(depth: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], length: float) -> Float[ndarray, "h w"]:
@@ -145,7 +155,7 @@ def _slope_modes(slopes: Float[ndarray, "n 2"]) -> list[Float[ndarray, "2"]]:
         if modes and np.count_nonzero(near) < MODE_SHARE * len(known):
             break
         modes.append(centre)
-        left = left[np.abs(left - centre).max(axis=1) >= 1.5 * MODE_REACH]
+        left = left[np.abs(left - centre).max(axis=1) >= MODE_REACH]
     return modes
 
 
@@ -164,15 +174,16 @@ class CoarseLine:
     level: float
 
 
-def trace_valleys(chart: Chart, images: list[ValleyImage], config: ProfileConfig) -> list[CoarseLine]:
+def trace_valleys(images: list[ValleyImage], config: ProfileConfig) -> list[CoarseLine]:
     """Coarse centre lines, one for each elongated valley of each image, the strongest first."""
-    lines = [line for valleys in images for line in _trace(chart, valleys, config)]
+    lines = [line for valleys in images for line in _trace(valleys, config)]
     lines.sort(key=lambda line: -line.evidence * line.level)
     return lines[:MAX_LINES]
 
 
-def _trace(chart: Chart, valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
+def _trace(valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
     """Coarse centre lines, one for each elongated valley of an image."""
+    chart = valleys.chart
     seeds = (valleys.lined > valleys.threshold) & valleys.around
     extent = (valleys.around & (valleys.lined > valleys.low) & (valleys.depth > 0.4 * valleys.lined)).astype(np.uint8)
     if config.min_width / chart.pitch >= 3:  # cell-wide threads run along the steps of outer edges
@@ -250,7 +261,7 @@ def _centre_lines(
     """Paths (column, row) along a mask's middle: the longest geodesic first, then what it left over (branches)."""
     lines: list[Float[ndarray, "k 2"]] = []
     remaining = mask.copy()
-    for _ in range(6):
+    for _ in range(MOST_BRANCHES):
         number, labels, stats, _ = cv2.connectedComponentsWithStats(remaining.astype(np.uint8), connectivity=8)
         if number < 2:
             break
