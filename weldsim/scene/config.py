@@ -8,12 +8,28 @@ import numpy as np
 from weldsim.errors import SceneError
 from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.quantity import Metre, Radian
+from weldsim.scene.views import CameraPoseConfig, ViewConfig
 from weldsim.scene.workpieces.base import Workpiece
+from weldsim.scene.workpieces.branches import BranchesConfig, make_branched_plate
 from weldsim.scene.workpieces.centre_line import CentreLineConfig
+from weldsim.scene.workpieces.cuboid import CuboidConfig, make_cuboid
+from weldsim.scene.workpieces.cylinder import CylinderConfig, make_cylinder
 from weldsim.scene.workpieces.groove import GrooveConfig
 from weldsim.scene.workpieces.plate import PlainPlate, PlateConfig, make_groove_plate
 
+__all__ = [
+    "CameraPoseConfig",
+    "FixtureConfig",
+    "MaterialConfig",
+    "PartPoseConfig",
+    "SceneConfig",
+    "ViewConfig",
+    "make_workpiece",
+    "part_pose",
+]
+
 Finish = Literal["matte", "mill_scale", "ground", "black"]
+WorkpieceKind = Literal["groove_plate", "plain_plate", "cylinder", "cuboid", "y"]
 
 
 @dataclass(frozen=True)
@@ -21,8 +37,9 @@ class PartPoseConfig:
     """Where the part lies on the table, in the robot base B (table top z = 0).
 
     Attributes:
-        x: of the middle of its upper face [m].
-        y: of the middle of its upper face [m].
+        x: of P's origin: the middle of its upper face, or of a cylinder's crest [m].
+        y: of the same [m].
+        z: of the same [m]; None takes `clearance`.
         clearance: between the table and its lowest corner [m].
         yaw: about the vertical [rad].
         tilt: of its upper face from the horizontal [rad].
@@ -31,6 +48,7 @@ class PartPoseConfig:
 
     x: Metre = 0.0
     y: Metre = -0.45
+    z: Metre | None = None
     clearance: Metre = 0.0
     yaw: Radian = 0.0
     tilt: Radian = 0.0
@@ -42,11 +60,13 @@ class FixtureConfig:
     """What holds the part.
 
     Attributes:
+        stand: whether a part that is held above the table has legs under it, or hangs in the air.
         clamps: step clamps on the part's long sides: 0, 2 or 4.
         overlap: of each clamp's nose over the part [m].
-        bolts: bolt heads standing on the part's surface, as clutter: 0 to 6.
+        bolts: bolt heads standing on the part's level surface, as clutter: 0 to 6.
     """
 
+    stand: bool = True
     clamps: Literal[0, 2, 4] = 4
     overlap: Metre = 0.018
     bolts: int = 0
@@ -70,74 +90,6 @@ class MaterialConfig:
 
 
 @dataclass(frozen=True)
-class CameraPoseConfig:
-    """An explicit pose of the wrist camera's optical frame in the robot base B.
-
-    Attributes:
-        x: position [m].
-        y: position [m].
-        z: position [m].
-        quaternion_wxyz: orientation; x right, y down, z forward.
-    """
-
-    x: Metre
-    y: Metre
-    z: Metre
-    quaternion_wxyz: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class ViewConfig:
-    """One scan view of the wrist camera, which looks at the middle of the part's upper face unless told otherwise.
-
-    Attributes:
-        standoff: from the part along the optical axis [m].
-        tilt: of the optical axis from the part's normal [rad].
-        heading: direction about the part's normal, from its x, in which the camera stands off when tilted [rad].
-        roll: about the optical axis, 0 with the image's right along the part's x [rad].
-        shift_x: of the point looked at, along the part's x [m].
-        shift_y: of the point looked at, along the part's y [m].
-        camera_in_base: the camera's pose itself; everything above is then not used.
-    """
-
-    standoff: Metre = 0.40
-    tilt: Radian = 0.0
-    heading: Radian = 0.0
-    roll: Radian = 0.0
-    shift_x: Metre = 0.0
-    shift_y: Metre = 0.0
-    camera_in_base: CameraPoseConfig | None = None
-
-    def pose(self, X_BP: Transform) -> Transform:
-        """X_BC, for a part at X_BP.
-
-        Raises:
-            SceneError: a standoff outside 0.1 to 2 m, or a tilt of 80 deg or more.
-        """
-        explicit = self.camera_in_base
-        if explicit is not None:
-            return Transform.from_quaternion(
-                "BC", np.array(explicit.quaternion_wxyz, float), np.array([explicit.x, explicit.y, explicit.z], float)
-            )
-        if not 0.1 <= self.standoff <= 2.0:
-            raise SceneError(f"view: standoff {self.standoff * 1e3:g} mm must be 100 to 2000 mm", key="standoff", limit=(0.1, 2.0))
-        if abs(self.tilt) >= np.radians(80):
-            raise SceneError(
-                f"view: tilt {np.degrees(self.tilt):g} deg must be under 80 deg", key="tilt", limit=float(np.radians(80))
-            )
-        return X_BP @ self.pose_in_part()
-
-    def pose_in_part(self) -> Transform:
-        """X_PC: the camera looking at the part."""
-        c, s = np.cos(self.heading), np.sin(self.heading)
-        lean = matrix_from_rotation_vector(self.tilt * np.array([-s, c, 0.0]))  # +z leans towards `heading`
-        facing = np.diag([1.0, -1.0, -1.0])
-        R = lean @ facing @ matrix_from_rotation_vector(np.array([0.0, 0.0, self.roll]))
-        target = np.array([self.shift_x, self.shift_y, 0.0])
-        return Transform("PC", R, target - self.standoff * R[:, 2])
-
-
-@dataclass(frozen=True)
 class SceneConfig:
     """One scene.
 
@@ -145,9 +97,12 @@ class SceneConfig:
         name: what it is called.
         title: one line for people.
         workpiece: which kind of part.
-        plate: its dimensions.
+        plate: dimensions of a plate, grooved, plain or with a Y.
+        cylinder: dimensions of a cylinder.
+        cuboid: dimensions of a cuboid.
         groove: its groove's cross-section.
-        centre_line: where its groove runs.
+        centre_line: where the groove of a groove plate runs.
+        branches: where those of a Y run.
         pose: where it lies.
         fixture: what holds it.
         material: how it looks.
@@ -156,10 +111,13 @@ class SceneConfig:
 
     name: str = "scene"
     title: str = ""
-    workpiece: Literal["groove_plate", "plain_plate"] = "groove_plate"
+    workpiece: WorkpieceKind = "groove_plate"
     plate: PlateConfig = field(default_factory=PlateConfig)
+    cylinder: CylinderConfig = field(default_factory=CylinderConfig)
+    cuboid: CuboidConfig = field(default_factory=CuboidConfig)
     groove: GrooveConfig = field(default_factory=GrooveConfig)
     centre_line: CentreLineConfig = field(default_factory=CentreLineConfig)
+    branches: BranchesConfig = field(default_factory=BranchesConfig)
     pose: PartPoseConfig = field(default_factory=PartPoseConfig)
     fixture: FixtureConfig = field(default_factory=FixtureConfig)
     material: MaterialConfig = field(default_factory=MaterialConfig)
@@ -172,16 +130,24 @@ def make_workpiece(config: SceneConfig) -> Workpiece:
     Raises:
         SceneError: dimensions that contradict each other.
     """
-    if config.workpiece == "plain_plate":
-        return PlainPlate(config.plate.checked())
-    return make_groove_plate(config.plate, config.groove, config.centre_line)
+    match config.workpiece:
+        case "plain_plate":
+            return PlainPlate(config.plate.checked())
+        case "groove_plate":
+            return make_groove_plate(config.plate, config.groove, config.centre_line)
+        case "cylinder":
+            return make_cylinder(config.cylinder, config.groove)
+        case "cuboid":
+            return make_cuboid(config.cuboid, config.groove)
+        case "y":
+            return make_branched_plate(config.plate, config.groove, config.branches)
 
 
 def part_pose(config: PartPoseConfig, workpiece: Workpiece) -> Transform:
-    """X_BP: the part lifted so that its lowest corner is `clearance` above the table.
+    """X_BP: the part with its origin at the given height, or lifted so that its lowest corner is `clearance` above the table.
 
     Raises:
-        SceneError: a tilt of 60 deg or more, or a clearance below the table.
+        SceneError: a tilt of 60 deg or more, or a corner below the table.
     """
     if abs(config.tilt) >= np.pi / 3:
         raise SceneError(f"pose: tilt {np.degrees(config.tilt):g} deg must be under 60 deg", key="tilt", limit=np.pi / 3)
@@ -193,4 +159,13 @@ def part_pose(config: PartPoseConfig, workpiece: Workpiece) -> Transform:
     lean = matrix_from_rotation_vector(config.tilt * np.array([-s, c, 0.0]))
     R = lean @ matrix_from_rotation_vector(np.array([0.0, 0.0, config.yaw]))
     lowest = float((workpiece.base_corners @ R.T)[:, 2].min())
-    return Transform("BP", R, np.array([config.x, config.y, config.clearance - lowest]))
+    if config.z is None:
+        return Transform("BP", R, np.array([config.x, config.y, config.clearance - lowest]))
+    if config.z + lowest < -1e-9:
+        raise SceneError(
+            f"pose: z {config.z * 1e3:g} mm puts the part's lowest corner {-(config.z + lowest) * 1e3:.1f} mm below the table;"
+            f" use {-lowest * 1e3:.1f} mm or more",
+            key="z",
+            limit=-lowest,
+        )
+    return Transform("BP", R, np.array([config.x, config.y, config.z]))

@@ -15,7 +15,7 @@ from weldsim.mounts import D415_640X480, X_FC, X_WB
 from weldsim.records import CameraIntrinsics, KnownSeam
 from weldsim.scene.cell import new_cell
 from weldsim.scene.config import SceneConfig, make_workpiece, part_pose
-from weldsim.scene.fixture import add_clamps, add_wedge
+from weldsim.scene.fixture import add_fixture
 from weldsim.scene.mesh_cache import cached_mesh
 from weldsim.scene.quiet import keep_quiet
 from weldsim.scene.shapes import Group, box, mesh_geom
@@ -156,8 +156,7 @@ def _add_part(spec: Any, config: SceneConfig, workpiece: Workpiece, X_BP: Transf
     for i, block in enumerate(workpiece.collision_boxes()):
         geom = box(part, f"part_collision_{i}", block.centre, block.half, "collision", group=Group.COLLISION, collide=True)
         geom.quat = Transform("PS", block.R, block.centre).quaternion
-    add_clamps(part, config.fixture, config.plate)
-    add_wedge(spec, base, X_BP, workpiece.base_corners)
+    add_fixture(spec, base, part, config.fixture, workpiece, X_BP)
 
 
 def _label(model: Any, geom: int) -> Label:
@@ -170,6 +169,6 @@ def _label(model: Any, geom: int) -> Label:
         return "groove"
     if name.startswith("part"):
         return "part"
-    if name.startswith(("clamp", "wedge")):
+    if name.startswith(("clamp", "wedge", "stand")):
         return "clamp"
     return "table" if name == "table" else "room"

@@ -63,12 +63,44 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class ClampPlace:
+    """Where a step clamp can hold the part, in P.
+
+    Attributes:
+        edge: (3,) a point of the upper surface at the part's edge [m].
+        R: (3, 3) x along the edge, y outwards from the part, z out of the surface.
+        thickness: of the part there [m].  limit: how far over the part the clamp may reach [m].
+    """
+
+    edge: Float[ndarray, "3"]
+    R: Float[ndarray, "3 3"]
+    thickness: float
+    limit: float
+
+
+def edge_places(count: int, length: float, width: float, thickness: float) -> tuple[ClampPlace, ...]:
+    """Clamps on the two long sides of a flat top, `length` along x and `width` along y [m]: one a side, or two."""
+    across = {0: (), 2: ((0.0, 1), (0.0, -1)), 4: ((-0.3, 1), (0.3, 1), (-0.3, -1), (0.3, -1))}[count]
+    limit = min(width / 4, 0.045)
+    return tuple(
+        ClampPlace(
+            edge=np.array([along * length, side * width / 2, 0.0]),
+            R=np.diag([float(side), float(side), 1.0]),
+            thickness=thickness,
+            limit=limit,
+        )
+        for along, side in across
+    )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SeamCurve:
     """A true seam in the part frame P, sampled from its closed form.
 
     Attributes:
         opening, root, left, right: (n, 3) [m].  tangents: (n, 3) unit, along travel.
-        bisectors: (n, 3) unit, inward.  s: (n,) arc length of the opening [m].  name: workpiece and branch.
+        bisectors: (n, 3) unit, inward; the parent surface's outward normal, on either side of a groove, is their opposite.
+        s: (n,) arc length of the opening [m].  name: workpiece and branch.
     """
 
     opening: Float[ndarray, "n 3"]
@@ -79,6 +111,11 @@ class SeamCurve:
     bisectors: Float[ndarray, "n 3"]
     s: Float[ndarray, "n"]
     name: str
+
+    @property
+    def normals(self) -> Float[ndarray, "n 3"]:
+        """(n, 3) unit, out of the face that the groove is cut into."""
+        return -self.bisectors
 
     def in_base(self, X_BP: Transform) -> KnownSeam:
         """The same seam expressed in the robot base."""
@@ -123,6 +160,15 @@ class Workpiece(ABC):
     @abstractmethod
     def base_corners(self) -> Float[ndarray, "k 3"]:
         """Corners of the convex outline of its underside [m], in P: what it rests on."""
+
+    @property
+    def flat_top(self) -> tuple[float, float] | None:
+        """Length along x and width along y [m] of a level upper face about P's origin; None where it is bent."""
+        return None
+
+    @abstractmethod
+    def clamp_places(self, count: int) -> tuple[ClampPlace, ...]:
+        """Where 0, 2 or 4 clamps hold it."""
 
     def known_seams(self, X_BP: Transform) -> tuple[KnownSeam, ...]:
         """The true seams expressed in the robot base."""

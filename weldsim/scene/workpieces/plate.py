@@ -1,20 +1,18 @@
 """Flat plates: one with a straight or curved groove, and a plain one that has no seam."""
 
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import SceneError
 from weldsim.quantity import Metre
-from weldsim.scene.workpieces.base import Box, LabelledMesh, SeamCurve, Workpiece
+from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCurve, Workpiece, edge_places
 from weldsim.scene.workpieces.centre_line import CentreLine, CentreLineConfig, make_centre_line
 from weldsim.scene.workpieces.groove import GrooveConfig, GrooveSection, make_section
-
-SWEEP_STEP = 0.5e-3  # [m] between cross-sections: a chord leaves a 0.1 m arc by 0.3 um
-ABOVE = 1e-3  # [m] the cutter stands proud of the surface, so that no faces coincide
+from weldsim.scene.workpieces.solid import ABOVE, SWEEP_STEP, Surface, block, cut, extrude, sweep
 
 
 @dataclass(frozen=True)
@@ -59,6 +57,13 @@ class _Plate(Workpiece):
         z = -self.plate.thickness
         return np.array([[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]])
 
+    @property
+    def flat_top(self) -> tuple[float, float]:
+        return self.plate.length, self.plate.width
+
+    def clamp_places(self, count: int) -> tuple[ClampPlace, ...]:
+        return edge_places(count, self.plate.length, self.plate.width, self.plate.thickness)
+
 
 @final
 @dataclass(frozen=True)
@@ -76,7 +81,7 @@ class PlainPlate(_Plate):
         return repr(self)
 
     def build_mesh(self) -> LabelledMesh:
-        vertices, faces, _ = _solid(_blank(self.plate.checked()))
+        vertices, faces = _blank(self.plate.checked())
         return LabelledMesh(vertices=vertices, faces=faces, groove=np.zeros(len(faces), bool))
 
     def seam_curves(self) -> tuple[SeamCurve, ...]:
@@ -130,9 +135,9 @@ class GroovePlate(_Plate):
         s = self.line.arc_length(x)
         return (
             SeamCurve(
-                opening=centre,
+                opening=centre + self.section.opening_depth * down,
                 root=centre + self.section.depth * down,
-                left=centre + self.section.width / 2 * left,
+                left=centre + self.section.width / 2 * left + self.section.misalignment * down,
                 right=centre - self.section.width / 2 * left,
                 tangents=tangents,
                 bisectors=np.array(down),
@@ -142,49 +147,41 @@ class GroovePlate(_Plate):
         )
 
     def build_mesh(self) -> LabelledMesh:
-        import manifold3d
+        return cut(_blank(self.plate), [self._cutter()], [self._lower_side()] if self.section.misalignment > 0 else ())
 
-        vertices, faces = self._cutter()
-        cutter = manifold3d.Manifold(manifold3d.Mesh64(vertices, faces.astype(np.uint64)))
-        if cutter.status() != manifold3d.Error.NoError:
-            raise SceneError(f"groove: its swept solid is not closed ({cutter.status()}); use a larger radius", key="radius")
-        cutter = cutter.as_original()
-        vertices, faces, origin = _solid(_blank(self.plate) - cutter)
-        return LabelledMesh(vertices=vertices, faces=faces, groove=origin == cutter.original_id())
-
-    def _cutter(self) -> tuple[Float[ndarray, "n 3"], Int[ndarray, "m 3"]]:
+    def _cutter(self) -> Surface:
         """The material the groove removes: its section swept along the line, run out past the edges along the end tangents."""
-        x = self.stations()
-        centres = np.column_stack([x, self.line.y(x)])
-        tangents = self.line.tangents(x)
+        centres, tangents = self._centres()
         outline = self.section.outline(ABOVE)
         if self.groove.margin == 0:
             half = float(np.abs(outline[:, 0]).max())
-            reach = (half * np.abs(tangents[[0, -1], 1]) + ABOVE) / tangents[[0, -1], 0]
-            first, last = centres[0] - reach[0] * tangents[0], centres[-1] + reach[1] * tangents[-1]
-            centres = np.vstack([first, centres, last])
-            tangents = np.vstack([tangents[:1], tangents, tangents[-1:]])
-        return sweep(outline, centres, tangents)
+            centres, tangents = _run_out(centres, tangents, (half * np.abs(tangents[[0, -1], 1]) + ABOVE) / tangents[[0, -1], 0])
+        right = np.column_stack([tangents[:, 1], -tangents[:, 0]])
+        flat = np.zeros((len(centres), 1))
+        up = np.tile([0.0, 0.0, 1.0], (len(centres), 1))
+        return sweep(outline, np.hstack([centres, flat]), np.hstack([right, flat]), up)
+
+    def _lower_side(self) -> Surface:
+        """What the left of the line lacks where it lies lower than the right, from edge to edge."""
+        centres, tangents = self._centres()
+        reach = (np.full(2, self.groove.margin + ABOVE)) / tangents[[0, -1], 0]
+        line, _ = _run_out(centres, tangents, reach)
+        far = self.plate.width
+        outline = np.vstack([line, [[line[-1, 0], far], [line[0, 0], far]]])
+        return extrude(outline, -self.section.misalignment, ABOVE)
+
+    def _centres(self) -> tuple[Float[ndarray, "n 2"], Float[ndarray, "n 2"]]:
+        """The centre line and its unit tangents, seen from above."""
+        x = self.stations()
+        return np.column_stack([x, self.line.y(x)]), self.line.tangents(x)
 
 
-def sweep(
-    outline: Float[ndarray, "k 2"], centres: Float[ndarray, "n 2"], tangents: Float[ndarray, "n 2"]
-) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"]]:
-    """Vertices [m] and outward faces of a convex outline (across, up) carried along a planar line, closed by flat ends.
-
-    Args:
-        outline: counter-clockwise, across = to the left of travel counted negative, so that it is seen from behind.
-        centres, tangents: of the line in the plane z = 0.
-    """
-    n, k = len(centres), len(outline)
-    right = np.column_stack([tangents[:, 1], -tangents[:, 0]])
-    ring = centres[:, None, :] + outline[None, :, :1] * right[:, None, :]
-    vertices = np.concatenate([ring, np.broadcast_to(outline[None, :, 1:], (n, k, 1))], axis=2).reshape(-1, 3)
-    a = (np.arange(n - 1)[:, None] * k + np.arange(k)[None, :]).ravel()
-    b = (np.arange(n - 1)[:, None] * k + (np.arange(k)[None, :] + 1) % k).ravel()
-    sides = np.concatenate([np.column_stack([a, b + k, b]), np.column_stack([a, a + k, b + k])])
-    fan = np.column_stack([np.zeros(k - 2, int), np.arange(1, k - 1), np.arange(2, k)])
-    return vertices, np.concatenate([sides, fan, fan[:, ::-1] + (n - 1) * k])
+def _run_out(
+    centres: Float[ndarray, "n 2"], tangents: Float[ndarray, "n 2"], reach: Float[ndarray, "2"]
+) -> tuple[Float[ndarray, "m 2"], Float[ndarray, "m 2"]]:
+    """The line carried on straight by reach[0] before its start and reach[1] after its end [m], tangents with it."""
+    first, last = centres[0] - reach[0] * tangents[0], centres[-1] + reach[1] * tangents[-1]
+    return np.vstack([first, centres, last]), np.vstack([tangents[:1], tangents, tangents[-1:]])
 
 
 def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: CentreLineConfig) -> GroovePlate:
@@ -231,18 +228,7 @@ def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: Cen
     return part
 
 
-def _blank(plate: PlateConfig) -> Any:
-    """The plate before its groove, as a solid of the library that loads late."""
-    import manifold3d
-
-    x, y, z = 2 * plate.half
-    return manifold3d.Manifold.cube((x, y, z)).translate((-x / 2, -y / 2, -z)).as_original()
-
-
-def _solid(manifold: Any) -> tuple[Float[ndarray, "n 3"], Int[ndarray, "m 3"], Int[ndarray, "m"]]:
-    """Vertices, faces, and which original solid each face came from."""
-    mesh = manifold.to_mesh64()
-    faces = np.asarray(mesh.tri_verts).astype(np.int64)
-    run = np.asarray(mesh.run_index).astype(np.int64) // 3
-    origin = np.repeat(np.asarray(mesh.run_original_id).astype(np.int64), np.diff(run))
-    return np.ascontiguousarray(np.asarray(mesh.vert_properties)[:, :3]), faces, origin
+def _blank(plate: PlateConfig) -> Surface:
+    """The plate before its groove."""
+    x, y, z = plate.half
+    return block((-x, -y, -2 * z), (x, y, 0.0))
