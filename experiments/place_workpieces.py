@@ -41,7 +41,8 @@ def inverted_u(points: np.ndarray) -> str:
     length, x, y, top = np.round([right - left, (left + right) / 2, y, top], 3)
     worst = np.hypot(*residuals(np.array([x - length / 2, x + length / 2, y, top])).reshape(2, -1)).max()
     low = points[:, 2].min()
-    return f"length {length * 1e3:.0f} mm, lowest point at z {low * 1e3:.0f} mm: top at {show(x, y, top)}, worst point {worst * 1e3:.1f} mm"
+    size = f"length {length * 1e3:.0f} mm, lowest point at z {low * 1e3:.0f} mm"
+    return f"{size}: top at {show(x, y, top)}, worst point {worst * 1e3:.1f} mm"
 
 
 def line(points: np.ndarray) -> str:

@@ -27,7 +27,7 @@ class BranchesConfig:
 
     branches: Literal[1, 3] = 3
     junction: Metre = 0.0
-    spread: Radian = np.radians(120.0)
+    spread: Radian = 2 * np.pi / 3
 
 
 @final

@@ -30,7 +30,7 @@ class CylinderConfig:
     radius: Metre = 0.300
     thickness: Metre = 0.020
     length: Metre = 0.200
-    span: Radian = np.radians(64.0)
+    span: Radian = 64 / 180 * np.pi
 
 
 @final
@@ -95,7 +95,7 @@ class Cylinder(Workpiece):
         """An outline carried along the arc to `half` [rad] on both sides of the crest, at the same angles every time."""
         inner = _angles(self.shell.span / 2, self.shell.radius)
         angle = inner[np.abs(inner) < half - 1e-9]
-        angle = np.concatenate([[-half], angle, [half]])
+        angle = np.array([-half, *angle, half])
         return sweep(outline, self.point(angle), np.tile([0.0, -1.0, 0.0], (len(angle), 1)), _out(angle))
 
     def collision_boxes(self) -> tuple[Box, ...]:
@@ -125,7 +125,7 @@ class Cylinder(Workpiece):
         for side in (1.0, -1.0):
             for a in angles:
                 R = _frame(a) @ np.diag([side, side, 1.0])
-                edge = self.point(np.array(a)) + [0.0, side * self.shell.length / 2, 0.0]
+                edge = self.point(np.array(a)) + np.array([0.0, side * self.shell.length / 2, 0.0])
                 places.append(ClampPlace(edge=edge, R=R, thickness=self.shell.thickness, limit=min(self.shell.length / 4, 0.045)))
         return tuple(places)
 
