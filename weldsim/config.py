@@ -19,6 +19,7 @@ from weldsim.execution.config import ExecutionConfig
 from weldsim.motion.config import MotionConfig
 from weldsim.path.config import PathConfig
 from weldsim.report.limits import ReportConfig
+from weldsim.scene.miscalibration import TwinConfig
 from weldsim.schema import describe, structure, to_json
 from weldsim.seam.config import SeamConfig
 from weldsim.sensor.d415 import D415Config
@@ -29,6 +30,9 @@ __all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config",
 @dataclass(frozen=True, kw_only=True)
 class CellConfig:
     """Everything that a job can be told, one table a stage. To add a stage: import its config, add its line here."""
+
+    twin: TwinConfig = field(default_factory=TwinConfig)
+    """How the simulated cell differs from what its software believes."""
 
     sensor: D415Config = field(default_factory=D415Config)
     """How the simulated D415 sees."""

@@ -151,6 +151,9 @@ def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float
 def scan(world: "World", config: CellConfig, seed: int = 0, sensor: SensorName = "d415") -> tuple["Capture", ...]:
     """One exposure from each view of the scene, the arm standing where it holds the camera.
 
+    The frames say where the camera was meant to stand; where the cell is miscalibrated (`config.twin`, with which the world
+    was built) it stood elsewhere.
+
     Raises:
         UnreachableError: a view that the arm cannot take.  SensorError: nothing draws here.
     """
@@ -160,10 +163,12 @@ def scan(world: "World", config: CellConfig, seed: int = 0, sensor: SensorName =
 
     captures = []
     for index, X_BC in enumerate(world.views):
-        exact = ExactSensor(twin_scene(world, world.new_data(world.view_joints(index))), world.intrinsics)
+        data = world.new_data(world.view_joints(index))
+        exact = ExactSensor(twin_scene(world, data), world.intrinsics)
         camera = D415Fast(exact, config.sensor, seed=seed) if sensor == "d415" else exact
         try:
-            captures.append(camera.capture(View(X_BC=X_BC)))
+            capture = camera.capture(View(X_BC=world.camera_pose(index, data)))
+            captures.append(replace(capture, frame=replace(capture.frame, X_BC=X_BC)))
         finally:
             exact.close()
     return tuple(captures)
@@ -191,7 +196,7 @@ def look(
 
     config, clock = config or CellConfig(), clock or Clock()
     with clock.stage("scene"):
-        world = build_world(scene) if world is None else world
+        world = build_world(scene, twin=config.twin) if world is None else world
     with clock.stage("sensor"):
         captures = scan(world, config, seed, sensor)
     with clock.stage("cloud"):

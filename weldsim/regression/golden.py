@@ -13,7 +13,7 @@ from typing import Any
 from weldsim import __version__
 from weldsim.errors import InputError
 from weldsim.output import write_whole
-from weldsim.regression.figures import FIGURES, Figures
+from weldsim.regression.figures import FIGURES, Figures, tolerance_of
 
 SCHEMA = "weldsim.golden/1"
 DIGITS = 7  # decimals kept: 0.1 um
@@ -167,13 +167,13 @@ def updated(golden: Golden, rows: Iterable[Figures], reason: str) -> Golden:
         before = golden.entries(scene, method)
         judged = [row.judged() for row in members]
         names = [name for name in FIGURES if any(name in figures for figures in judged)]
-        new = {name: _renewed(name, [figures.get(name) for figures in judged], before.get(name), reason) for name in names}
+        new = {name: _renewed(name, method, [figures.get(name) for figures in judged], before.get(name), reason) for name in names}
         kept = {name: entry for name, entry in before.items() if name.startswith(("executed", "tracking")) and name not in new}
         scenes.setdefault(scene, {})[method] = new | kept
     return replace(golden, reason=reason.strip(), version=__version__, scenes=scenes)
 
 
-def _renewed(name: str, values: list[float | None], before: Entry | None, reason: str) -> Entry:
+def _renewed(name: str, method: str, values: list[float | None], before: Entry | None, reason: str) -> Entry:
     rounded = tuple(None if value is None else round(float(value), DIGITS) for value in values)
     if FIGURES[name].kind == "time":  # the machine's mood is no change
         rounded = tuple(None if value is None else round(value, 2) for value in rounded)
@@ -182,7 +182,7 @@ def _renewed(name: str, values: list[float | None], before: Entry | None, reason
             if all(a is not None and b is not None and b / 2 <= a <= 2 * b for a, b in zip(rounded, old, strict=True)):
                 return before
     if before is None:
-        return Entry(values=rounded, tolerance=FIGURES[name].tolerance, reason=reason.strip())
+        return Entry(values=rounded, tolerance=tolerance_of(name, method), reason=reason.strip())
     if before.values == rounded:
         return before
     return replace(before, values=rounded, reason=reason.strip())

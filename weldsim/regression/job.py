@@ -25,6 +25,7 @@ from weldsim.run_folder import MANIFEST, SCHEMA, check_run_folder, write_run
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
+    from weldsim.scene.miscalibration import TwinConfig
     from weldsim.scene.world import World
 
 PICTURE = (1000, 80)  # width [px] and quality of the page's JPEG pictures
@@ -80,7 +81,9 @@ def carry_out(task: Task) -> tuple[Row, ...]:
     with threadpool_limits(1, user_api="blas"):
         try:
             clock = Clock()
-            seen = look(task.scene, next(iter(task.methods.values())), seed=task.seed, world=_built(task.scene), clock=clock)
+            config = next(iter(task.methods.values()))
+            world = _built(task.scene, config.twin)
+            seen = look(task.scene, config, seed=task.seed, world=world, clock=clock)
         except MotionError as error:  # a view out of reach: there is no cloud
             return tuple(_unseen(task, method, error) for method in task.methods)
         seconds = sum(seen.timing.values())
@@ -88,10 +91,10 @@ def carry_out(task: Task) -> tuple[Row, ...]:
 
 
 @lru_cache(maxsize=2)
-def _built(scene: "SceneConfig") -> "World":
+def _built(scene: "SceneConfig", twin: "TwinConfig") -> "World":
     from weldsim.scene.world import build_world
 
-    return build_world(scene)
+    return build_world(scene, twin=twin)
 
 
 def _planned(task: Task, method: str, seen: Sighting) -> Row:
@@ -143,7 +146,7 @@ def _nothing(seen: Sighting, method: str, config: CellConfig, reason: str, clock
 
 def _unseen(task: Task, method: str, error: WeldsimError) -> Row:
     """The row of a scene that could not be scanned; its folder holds the settings and the reason."""
-    known = len(_built(task.scene).known_seams)
+    known = len(_built(task.scene, task.methods[method].twin).known_seams)
     figures = Figures(
         scene=task.scene.name,
         method=method,

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from weldsim.errors import SceneError, UnreachableError
-from weldsim.frames import Transform
+from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, inverse
 from weldsim.mounts import D415_640X480, X_FC, X_WB
 from weldsim.records import CameraIntrinsics, KnownSeam
@@ -17,6 +17,7 @@ from weldsim.scene.cell import new_cell
 from weldsim.scene.config import SceneConfig, make_workpiece, part_pose
 from weldsim.scene.fixture import add_fixture
 from weldsim.scene.mesh_cache import cached_mesh
+from weldsim.scene.miscalibration import TwinConfig
 from weldsim.scene.quiet import keep_quiet
 from weldsim.scene.shapes import Group, box, mesh_geom
 from weldsim.scene.tool import add_tool
@@ -24,6 +25,7 @@ from weldsim.scene.workpieces.base import Workpiece
 
 Label = Literal["groove", "part", "clamp", "table", "robot", "room"]
 
+LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1_link", "wrist_2_link", "wrist_3_link")  # bodies, each with its joint
 HOME = np.array([-1.57, -1.30, -1.90, -1.50, 1.57, 0.0])  # [rad] elbow up, the wrist over the table, the camera looking down
 
 
@@ -39,6 +41,7 @@ class World:
         known_seams: its true seams in the base, for `report` and tests alone.
         views: X_BC of each scan view, in order.
         intrinsics: of the wrist camera.
+        twin: how the cell differs from what its software believes.
         labels: {geom id: what it belongs to}, for every geom.
         qpos, dof, actuators: (6,) indices of the arm's joints in qpos, in qvel, and of its servos in ctrl.
     """
@@ -51,6 +54,7 @@ class World:
     known_seams: tuple[KnownSeam, ...]
     views: tuple[Transform, ...]
     intrinsics: CameraIntrinsics
+    twin: TwinConfig
     labels: dict[int, Label]
     qpos: Int[ndarray, "6"]
     dof: Int[ndarray, "6"]
@@ -69,6 +73,10 @@ class World:
         names = {"torch_tip": "WT", "flange": "WF"}[site]
         found = data.site(site)
         return self.X_WB.inverse() @ Transform(names, found.xmat.reshape(3, 3), found.xpos)
+
+    def camera_pose(self, view: int, data: Any) -> Transform:
+        """X_BC at which the wrist camera really stands when the arm in `data` believes to hold it at the view."""
+        return self.views[view] if self.twin.perfect else self.site_pose(data, "flange") @ self.twin.X_FC
 
     def geoms(self, label: Label) -> Int[ndarray, "k"]:
         """Ids of the geoms with this label."""
@@ -110,12 +118,17 @@ class World:
         return True
 
 
-def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480) -> World:
+def build_world(
+    config: SceneConfig,
+    intrinsics: CameraIntrinsics = D415_640X480,
+    twin: TwinConfig = TwinConfig(),  # noqa: B008 - frozen
+) -> World:
     """The compiled scene.
 
     Args:
         config: the scene.
         intrinsics: of the wrist camera's depth image.
+        twin: how the cell differs from what its software believes.
     Raises:
         SceneError: a scene that contradicts itself.
     """
@@ -125,6 +138,7 @@ def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480
     workpiece = make_workpiece(config)
     X_BP = part_pose(config.pose, workpiece)
     spec = new_cell(config.material)
+    _misplace_joints(spec, twin)
     add_tool(spec.body("wrist_3_link"), intrinsics)
     _add_part(spec, config, workpiece, X_BP)
     model = spec.compile()
@@ -138,11 +152,23 @@ def build_world(config: SceneConfig, intrinsics: CameraIntrinsics = D415_640X480
         known_seams=workpiece.known_seams(X_BP),
         views=tuple(view.pose(X_BP) for view in config.views),
         intrinsics=intrinsics,
+        twin=twin,
         labels={i: _label(model, i) for i in range(model.ngeom)},
         qpos=np.array([joint.qposadr[0] for joint in joints]),
         dof=np.array([joint.dofadr[0] for joint in joints]),
         actuators=np.array([model.actuator(name).id for name in JOINT_NAMES]),
     )
+
+
+def _misplace_joints(spec: Any, twin: TwinConfig) -> None:
+    """Every joint moved on its link by the arm's error."""
+    if twin.perfect:
+        return
+    for name, shift, turn in zip(LINKS, *twin.joint_errors(), strict=True):
+        body = spec.body(name)
+        error = Transform("SS", matrix_from_rotation_vector(turn), shift)
+        true = Transform.from_quaternion("SS", np.array(body.quat, float), np.array(body.pos, float)) @ error
+        body.pos, body.quat = true.p, true.quaternion
 
 
 def _add_part(spec: Any, config: SceneConfig, workpiece: Workpiece, X_BP: Transform) -> None:
