@@ -2,10 +2,14 @@
 
 from itertools import pairwise
 
+import mujoco
 import numpy as np
 from numpy import ndarray
 
+from weldsim.frames import Transform
 from weldsim.records import CameraIntrinsics
+from weldsim.sensor.base import Finish, Label, View
+from weldsim.sensor.exact import TwinScene
 
 FLAT = [(-10.0, 0.0), (10.0, 0.0)]
 
@@ -56,3 +60,37 @@ def points_in_part(intrinsics: CameraIntrinsics, depth: ndarray, z: float, *, ro
     """Points (h, w, 3) in the part's frame of a depth image [m]."""
     R_PC, origin = part_from_camera(z, rotation, tilt)
     return (intrinsics.rays() * depth[..., None].astype(float)) @ R_PC.T + origin
+
+
+def profile_scene(
+    profile: list[tuple[float, float]],
+    z: float,
+    *,
+    rotation: float = 0.0,
+    tilt: float = 0.0,
+    finish: Finish = Finish.MATTE,
+    reach: float = 0.6,
+) -> tuple[TwinScene, View]:
+    """The same surface as a mesh to render, cut off `reach` from the middle [m], and the view that `profile_depth` has of it."""
+    line = np.array(profile, float)
+    x = np.unique(np.clip(line[:, 0], -reach, reach))
+    corners = [(u, y, h) for y in (-reach, reach) for u, h in zip(x, np.interp(x, line[:, 0], line[:, 1]), strict=True)]
+    n = len(x)
+    faces = [face for k in range(n - 1) for face in ((k, k + 1, k + n + 1), (k, k + n + 1, k + n))]
+    text = [" ".join(f"{value:.9g}" for value in np.ravel(array)) for array in (corners, faces)]
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset><mesh name="m" inertia="shell" vertex="{text[0]}" face="{text[1]}"/></asset><worldbody>'
+        '<geom type="mesh" mesh="m" contype="0" conaffinity="0"/></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    # MuJoCo moves a mesh to its own centre and turns it to its axes of inertia; the geom's pose says how, so W stays P.
+    R_PC, origin = part_from_camera(z, rotation, tilt)
+    scene = TwinScene(
+        model=model,
+        data=data,
+        X_WB=Transform("WB", np.eye(3), np.zeros(3)),
+        labels=np.full(1, Label.PART, np.uint8),
+        finishes=np.full(1, finish, np.uint8),
+    )
+    return scene, View(X_BC=Transform("BC", R_PC, origin))

@@ -23,6 +23,8 @@ from weldsim.scene.miscalibration import TwinConfig
 from weldsim.schema import describe, structure, to_json
 from weldsim.seam.config import SeamConfig
 from weldsim.sensor.d415 import D415Config
+from weldsim.sensor.kinect import KinectConfig
+from weldsim.sensor.stereo_config import D415StereoConfig
 
 __all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config", "load_toml", "structure", "to_json"]
 
@@ -36,6 +38,12 @@ class CellConfig:
 
     sensor: D415Config = field(default_factory=D415Config)
     """How the simulated D415 sees."""
+
+    stereo: D415StereoConfig = field(default_factory=D415StereoConfig)
+    """How the reference D415 sees (sensor d415-stereo)."""
+
+    kinect: KinectConfig = field(default_factory=KinectConfig)
+    """How the simulated Kinect v2 sees (sensor kinect)."""
 
     cloud: CloudConfig = field(default_factory=CloudConfig)
     """What is kept of the cloud."""

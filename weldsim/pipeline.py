@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool
@@ -26,6 +26,7 @@ from weldsim.path.plan import plan_paths
 from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
 from weldsim.report.weld import weld_report
 from weldsim.seam.find import find_seams
+from weldsim.sensor.choose import SensorName, make_sensor, posture, stations
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from weldsim.scene.world import World
     from weldsim.sensor.base import Capture
 
-SensorName = Literal["d415", "exact"]
 Finder = Callable[[PointCloud], SeamFindings]
 """A seam finder: a cloud in the robot base in, seams best first out. It may read nothing but the cloud."""
 Tell = Callable[[str, float | None], None]
@@ -149,7 +149,7 @@ def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float
 
 
 def scan(world: "World", config: CellConfig, seed: int = 0, sensor: SensorName = "d415") -> tuple["Capture", ...]:
-    """One exposure from each view of the scene, the arm standing where it holds the camera.
+    """One exposure from each view of the scene, the arm standing where it holds the camera; the Kinect takes one from above.
 
     The frames say where the camera was meant to stand; where the cell is miscalibrated (`config.twin`, with which the world
     was built) it stood elsewhere.
@@ -158,19 +158,18 @@ def scan(world: "World", config: CellConfig, seed: int = 0, sensor: SensorName =
         UnreachableError: a view that the arm cannot take.  SensorError: nothing draws here.
     """
     from weldsim.sensor.base import View
-    from weldsim.sensor.exact import ExactSensor, twin_scene
-    from weldsim.sensor.stereo import D415Fast
+    from weldsim.sensor.exact import twin_scene
 
     captures = []
-    for index, X_BC in enumerate(world.views):
-        data = world.new_data(world.view_joints(index))
-        exact = ExactSensor(twin_scene(world, data), world.intrinsics)
-        camera = D415Fast(exact, config.sensor, seed=seed) if sensor == "d415" else exact
+    for index, X_BC in enumerate(stations(world, sensor)):
+        data = world.new_data(posture(world, sensor, index))
+        camera = make_sensor(sensor, twin_scene(world, data), world.intrinsics, config, seed=seed)
         try:
-            capture = camera.capture(View(X_BC=world.camera_pose(index, data)))
+            stands = X_BC if sensor == "kinect" else world.camera_pose(index, data)
+            capture = camera.capture(View(X_BC=stands))
             captures.append(replace(capture, frame=replace(capture.frame, X_BC=X_BC)))
         finally:
-            exact.close()
+            camera.close()
     return tuple(captures)
 
 
@@ -187,7 +186,7 @@ def look(
 
     Args:
         scene: what stands on the table.  config: everything else.
-        seed: of the camera's noise.  sensor: the D415 model, or exact depth.
+        seed: of the camera's noise.  sensor: which camera looks.
         world: `scene` already built, by whoever looks at it several times.  clock: takes the times.
     Raises:
         SceneError, UnreachableError, SensorError, CloudError: see the stages.
@@ -219,7 +218,7 @@ def run(
 
     Args:
         scene: what stands on the table.  config: everything else.
-        seed: of the camera's noise.  sensor: the D415 model, or exact depth.
+        seed: of the camera's noise.  sensor: which camera looks.
         number, near: which seam to weld; see `pick`.
         video: where to write a film of the weld.
         tell: told of progress.
@@ -256,7 +255,7 @@ def finish(
     """
     clock, world = clock or Clock(), seen.world
     welded, path = _to_weld(result, number, near)
-    motion, log = _weld(world, path, config, clock, video) if execute and path is not None else (None, None)
+    motion, log = _weld(seen, path, config, clock, video) if execute and path is not None else (None, None)
     with clock.stage("report"):
         report = weld_report(
             result.findings,
@@ -298,7 +297,7 @@ def _to_weld(result: PlanResult, number: int | None, near: Sequence[float] | Non
 
 
 def _weld(
-    world: "World", path: TorchPath, config: CellConfig, clock: Clock, video: "Path | None"
+    seen: Sighting, path: TorchPath, config: CellConfig, clock: Clock, video: "Path | None"
 ) -> tuple["MotionPlan", ExecutionLog]:
     """The motion from the last scan view along the path, and what the simulated arm did of it."""
     from weldsim.execution.runner import execute
@@ -307,7 +306,8 @@ def _weld(
     from weldsim.motion.collision import CellCollision
     from weldsim.motion.plan import plan_motion
 
-    q_start = world.view_joints(len(world.views) - 1)
+    world, last = seen.world, len(seen.captures) - 1
+    q_start = posture(world, seen.sensor, last)
     with clock.stage("motion"):
         motion = plan_motion(path, q_start, config.motion, blocked=CellCollision(world.model))
     with clock.stage("execution"), ExitStack() as stack:

@@ -20,13 +20,13 @@ from weldsim.records import ExecutionLog
 from weldsim.report.html import write_html
 from weldsim.report.png import write_png
 from weldsim.report.weld import report_json
+from weldsim.sensor.choose import SensorName, depth_step
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
 
 SCHEMA = "weldsim.run/1"
 MANIFEST = "run.json"
-EXACT_STEP = 1e-4  # [m] of exact depth in a PNG
 
 
 def check_run_folder(folder: Path) -> None:
@@ -43,7 +43,7 @@ def check_run_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: holds something other than a run and is left alone; give another --out", path=str(folder))
 
 
-def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: str) -> Path:
+def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: SensorName) -> Path:
     """The folder, in place of an earlier run's.
 
     It holds config.json (resolved), path.json, path.csv, cloud.ply, a depth image with intrinsics and pose for each view,
@@ -65,7 +65,7 @@ def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "Scene
     return folder
 
 
-def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: str) -> None:
+def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: SensorName) -> None:
     plan, report = result.plan, result.report
     resolved = {"cell": to_json(config), "scene": to_json(scene), "seed": seed, "sensor": sensor}
     _write_json(folder / "config.json", resolved)
@@ -77,8 +77,7 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     write_cloud(folder / "cloud.ply", plan.cloud)
     for index, capture in enumerate(result.captures):
         name = "depth" if len(result.captures) == 1 else f"depth_{index}"
-        step = config.sensor.depth_unit if sensor == "d415" else EXACT_STEP
-        write_depth_frame(folder / f"{name}.png", capture.frame, depth_unit=step or EXACT_STEP)
+        write_depth_frame(folder / f"{name}.png", capture.frame, depth_unit=depth_step(sensor, config))
     _write_json(folder / "report.json", report_json(report, config.report))
     seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": config.report}
     write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, **seen)

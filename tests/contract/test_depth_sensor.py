@@ -1,4 +1,4 @@
-"""What every depth sensor promises, run over all of them: exact by OpenGL and by rays, the D415 model, replay."""
+"""What every depth sensor promises, run over all of them: exact by OpenGL and by rays, both D415s, the Kinect v2, replay."""
 
 import numpy as np
 import pytest
@@ -8,14 +8,19 @@ from weldsim.errors import SensorError
 from weldsim.frames import Transform
 from weldsim.mounts import D415_640X480
 from weldsim.records import CameraIntrinsics
+from weldsim.sensor.active_stereo import D415Stereo
 from weldsim.sensor.base import Capture, DepthSensor, Label, View
 from weldsim.sensor.exact import ExactSensor
+from weldsim.sensor.kinect import KinectConfig
 from weldsim.sensor.replay import ReplaySensor
 from weldsim.sensor.stereo import D415Fast
+from weldsim.sensor.time_of_flight import KinectV2
 
 SMALL = CameraIntrinsics(width=400, height=240, fx=617.0, fy=616.5, cx=216.1, cy=113.9)
-KINDS = [pytest.param("gl", marks=pytest.mark.render), "embree", "d415", "replay"]
-NOISY = ("d415",)
+TWINS = [pytest.param("gl", marks=pytest.mark.render), "embree", "d415", "d415-stereo", "kinect"]
+KINDS = [*TWINS, "replay"]
+NOISY = ("d415", "d415-stereo", "kinect")
+NEAR = KinectConfig(nearest=0.2)  # the scene's views are those of the wrist camera
 SCENE = grooved_scene()
 
 
@@ -27,6 +32,10 @@ def make_sensor(kind: str, seed: int = 0, intrinsics: CameraIntrinsics = SMALL) 
         return exact
     if kind == "d415":
         return D415Fast(exact, seed=seed)
+    if kind == "d415-stereo":
+        return D415Stereo(SCENE, intrinsics, seed=seed)
+    if kind == "kinect":
+        return KinectV2(SCENE, intrinsics, NEAR, seed=seed)
     return ReplaySensor([exact.capture(view(seed=k)).frame for k in range(3)])
 
 
@@ -113,12 +122,26 @@ def test_noise_follows_seed_view_and_exposure(kind: str) -> None:
     assert abs(np.corrcoef(errors[0][both], errors[1][both])[0, 1]) < 0.1  # another view, other noise
 
 
-@pytest.mark.parametrize("kind", [pytest.param("gl", marks=pytest.mark.render), "embree", "d415"])
+@pytest.mark.parametrize("kind", TWINS)
 def test_the_twin_knows_what_was_in_view(kind: str) -> None:
-    truth = make_sensor(kind).capture(view()).truth
+    """Truth is that of the same pixels: labels and depth of the exact camera, and the frame agrees with it within its noise."""
+    capture = make_sensor(kind).capture(view())
+    truth, exact = capture.truth, make_sensor("embree").capture(view()).truth
     assert truth is not None
+    assert exact is not None
     assert {Label.TABLE, Label.PART, Label.GROOVE, Label.CLAMP} <= set(np.unique(truth.labels))
     assert ((truth.labels == Label.NONE) == np.isnan(truth.depth)).all()
+    same = truth.labels == exact.labels
+    assert same.mean() > 0.999
+    assert np.nanmedian(np.abs(truth.depth - exact.depth)) < 1e-6
+    assert np.nanmedian(np.abs(capture.frame.depth - truth.depth)) < 1.5e-3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_closing_twice_is_allowed(kind: str) -> None:
+    sensor = make_sensor(kind)
+    sensor.close()
+    sensor.close()
 
 
 def test_a_recording_has_no_truth() -> None:

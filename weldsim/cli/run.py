@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table, times
 from weldsim.errors import InputError, SensorError
+from weldsim.sensor.choose import SensorName
 
 if TYPE_CHECKING:
     from weldsim.config import CellConfig
@@ -29,8 +30,8 @@ class Run(ConfigOptions):
     seed: int = 0
     """Of the camera's noise."""
 
-    sensor: Literal["d415", "exact"] = "d415"
-    """What looks: the model of a D415, or exact depth."""
+    sensor: SensorName = "d415"
+    """What looks: the model of a D415, rendered and matched infrared images, the Kinect v2 above, or exact depth."""
 
     method: Method | None = None
     """Seam finder: ours (the default) or the published one."""

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress
 from weldsim.errors import InputError
+from weldsim.sensor.choose import SensorName, depth_step
 
 CLOUDS = (".ply", ".npz", ".xyz", ".txt")
 
@@ -22,8 +23,8 @@ class Scan(ConfigOptions):
     seed: int = 0
     """Of the camera's noise."""
 
-    sensor: Literal["d415", "exact"] = "d415"
-    """What looks: the model of a D415, or exact depth."""
+    sensor: SensorName = "d415"
+    """What looks: the model of a D415, rendered and matched infrared images, the Kinect v2 above, or exact depth."""
 
     out: Path | None = None
     """Where to write the cloud of all views: PLY, NPZ, XYZ or TXT."""
@@ -44,8 +45,9 @@ class Scan(ConfigOptions):
         files = () if self.depth is None else depth_file_names(self.depth)
         check_outputs((self.out, *files), (self.config,))
         config, scene = self.cell(), self.scene_of(self.scene)
-        if not 1 <= self.view <= max(1, len(scene.views)):
-            raise InputError(f"--view {self.view}: scene {scene.name!r} has {len(scene.views)}, counted from 1", view=self.view)
+        views = 1 if self.sensor == "kinect" else len(scene.views)
+        if not 1 <= self.view <= max(1, views):
+            raise InputError(f"--view {self.view}: scene {scene.name!r} has {views}, counted from 1", view=self.view)
         choose_platform()
 
         from weldsim.cloud.deproject import deproject
@@ -59,7 +61,7 @@ class Scan(ConfigOptions):
             tell("scan", None)
             captures = scan(world, config, self.seed, self.sensor)
         cloud = merge([deproject(capture.frame) for capture in captures])
-        self._write(cloud, captures[self.view - 1].frame, config.sensor.depth_unit)
+        self._write(cloud, captures[self.view - 1].frame, depth_step(self.sensor, config))
         written = [str(path) for path in (self.out, *files) if path is not None]
         if self.json:
             seen = {"scene": scene.name, "seed": self.seed, "sensor": self.sensor, "views": len(captures), "points": len(cloud)}
@@ -72,12 +74,11 @@ class Scan(ConfigOptions):
             print(f"  wrote {name}")
         return 0
 
-    def _write(self, cloud: Any, frame: Any, depth_unit: float) -> None:
+    def _write(self, cloud: Any, frame: Any, step: float) -> None:
         from weldsim.cloud.depth_output import write_depth_frame
         from weldsim.cloud.files import write_cloud
 
         if self.out is not None:
             write_cloud(self.out, cloud)
         if self.depth is not None:
-            step = depth_unit if self.sensor == "d415" and depth_unit > 0 else 1e-4
             write_depth_frame(self.depth, frame, depth_unit=step)

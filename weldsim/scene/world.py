@@ -27,6 +27,7 @@ Label = Literal["groove", "part", "clamp", "table", "robot", "room"]
 
 LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1_link", "wrist_2_link", "wrist_3_link")  # bodies, each with its joint
 HOME = np.array([-1.57, -1.30, -1.90, -1.50, 1.57, 0.0])  # [rad] elbow up, the wrist over the table, the camera looking down
+AWAY = HOME + np.array([np.pi, 0.0, 0.0, 0.0, 0.0, 0.0])  # [rad] turned off the table, out of the overhead camera's sight
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

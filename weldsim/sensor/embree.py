@@ -1,17 +1,35 @@
-"""Exact depth, geom ids and plain colour by ray casting (Embree through open3d), where no OpenGL is to be had."""
+"""Exact depth, geom ids, normals and shadows by ray casting (Embree through open3d): the back end where no OpenGL is to be
+had, and the one that rendered infrared images are made with."""
+
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 import open3d as o3d
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float, Float32, Int32, UInt8
 from numpy import ndarray
 
 from weldsim.frames import Transform
 from weldsim.records import CameraIntrinsics
-from weldsim.sensor.renderer import VISIBLE_GROUPS, Render, Renderer, geom_colours
+from weldsim.sensor.renderer import VISIBLE_GROUPS, Render, Renderer, dot, geom_colours, lengths
 from weldsim.sensor.solids import Triangles, geom_triangles
 
 AMBIENT, HEAD, OVERHEAD = 0.25, 0.45, 0.3  # shares of the light: everywhere, from the camera, from above
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Hits:
+    """What rays meet first, one through each pixel's centre.
+
+    Attributes:
+        z: depth along the optical axis [m], inf for a miss.  geom: id of the geom, -1 for a miss.
+        directions: of the rays in W, as long as z = 1 takes.  normals: of the triangles in W, either side, 0 for a miss.
+    """
+
+    z: Float32[ndarray, "h w"]
+    geom: Int32[ndarray, "h w"]
+    directions: Float32[ndarray, "h w 3"]
+    normals: Float32[ndarray, "h w 3"]
 
 
 class EmbreeRenderer(Renderer):
@@ -31,18 +49,37 @@ class EmbreeRenderer(Renderer):
     def render(
         self, data: mujoco.MjData, X_WC: Transform, intrinsics: CameraIntrinsics, *, colour: bool = True, depth: bool = True
     ) -> Render:
+        hits = self.hits(data, X_WC, intrinsics)
+        picture = self.shade(hits) if colour else None
+        if not depth:
+            return Render(depth=np.full_like(hits.z, np.nan), geom=np.full_like(hits.geom, -1), colour=picture)
+        return Render(depth=np.where(np.isfinite(hits.z), hits.z, np.float32(np.nan)), geom=hits.geom, colour=picture)
+
+    def hits(self, data: mujoco.MjData, X_WC: Transform, intrinsics: CameraIntrinsics) -> Hits:
+        """What each pixel of a pinhole camera at X_WC meets first."""
+        shape = (intrinsics.height, intrinsics.width, 3)
+        directions = (self._directions(intrinsics) @ X_WC.R.T.astype(np.float32)).reshape(shape)
+        return self.cast(data, np.broadcast_to(X_WC.p.astype(np.float32), shape), directions)
+
+    def cast(self, data: mujoco.MjData, origins_W: Float32[ndarray, "h w 3"], directions_W: Float32[ndarray, "h w 3"]) -> Hits:
+        """What any rays meet first; `z` is then in lengths of their directions."""
         self._place(data)
-        directions = self._directions(intrinsics) @ X_WC.R.T.astype(np.float32)
-        rays = np.empty((intrinsics.height, intrinsics.width, 6), np.float32)
-        rays[..., :3], rays[..., 3:] = X_WC.p, directions.reshape(intrinsics.height, intrinsics.width, 3)
+        rays = np.concatenate([origins_W, directions_W], axis=-1)
         hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
         z = hit["t_hit"].numpy()
         seen = np.isfinite(z)
         geom = np.where(seen, self._geom_of_id[np.where(seen, hit["geometry_ids"].numpy(), 0)], -1).astype(np.int32)
-        picture = self._shade(geom, hit["primitive_normals"].numpy(), directions) if colour else None
-        if not depth:
-            return Render(depth=np.full_like(z, np.nan), geom=np.full_like(geom, -1), colour=picture)
-        return Render(depth=np.where(seen, z, np.float32(np.nan)), geom=geom, colour=picture)
+        return Hits(z=z, geom=geom, directions=directions_W, normals=hit["primitive_normals"].numpy())
+
+    def reached(
+        self, data: mujoco.MjData, origin_W: Float[ndarray, "3"], points_W: Float32[ndarray, "h w 3"]
+    ) -> Bool[ndarray, "h w"]:
+        """Whether light from `origin_W` reaches each point [m]; a surface does not shade itself within 1/2000 of the way."""
+        self._place(data)
+        rays = np.empty((*points_W.shape[:2], 6), np.float32)
+        rays[..., :3], rays[..., 3:] = origin_W, points_W - origin_W.astype(np.float32)
+        rays[..., 3:][~np.isfinite(points_W).all(axis=-1)] = (0, 0, 1)
+        return ~self._scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), tnear=0.0, tfar=1 - 5e-4).numpy()
 
     def _directions(self, i: CameraIntrinsics) -> Float32[ndarray, "n 3"]:
         """Rays with z = 1 in C, so that the distance along a ray is the z-depth itself; kept for the next view."""
@@ -68,12 +105,9 @@ class EmbreeRenderer(Renderer):
         self._geom_of_id[ids] = self._geoms
         self._placed = (p.copy(), R.copy())
 
-    def _shade(
-        self, geom: ndarray, normals: Float32[ndarray, "h w 3"], directions: Float32[ndarray, "n 3"]
-    ) -> UInt8[ndarray, "h w 3"]:
-        """Lambert's law with a light at the camera and one overhead; black where nothing is."""
-        view = directions.reshape(normals.shape)
-        cosine = np.abs(np.sum(normals * view, axis=-1)) / np.linalg.norm(view, axis=-1)
-        light = AMBIENT + HEAD * cosine + OVERHEAD * np.clip(normals[..., 2], 0.0, 1.0)
-        shade = 255 * self._rgb[np.maximum(geom, 0)] * light[..., None]
-        return np.where((geom >= 0)[..., None], np.clip(shade, 0, 255), 0).astype(np.uint8)
+    def shade(self, hits: Hits) -> UInt8[ndarray, "h w 3"]:
+        """A colour image: Lambert's law with a light at the camera and one overhead; black where nothing is."""
+        cosine = np.abs(dot(hits.normals, hits.directions)) / lengths(hits.directions)
+        light = AMBIENT + HEAD * cosine + OVERHEAD * np.clip(hits.normals[..., 2], 0.0, 1.0)
+        shade = 255 * self._rgb[np.maximum(hits.geom, 0)] * light[..., None]
+        return np.where((hits.geom >= 0)[..., None], np.clip(shade, 0, 255), 0).astype(np.uint8)

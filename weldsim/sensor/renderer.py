@@ -85,6 +85,16 @@ def camera_pose(model: "mujoco.MjModel", data: "mujoco.MjData", camera: str) -> 
     return Transform("WC", data.cam_xmat[index].reshape(3, 3) @ OPTICAL_FROM_MUJOCO, data.cam_xpos[index])
 
 
+def dot(a: Float32[ndarray, "*n 3"], b: Float32[ndarray, "*n 3"]) -> Float32[ndarray, "*n"]:
+    """Scalar products of vectors along the last axis; several times as fast as a sum over an axis of three."""
+    return np.einsum("...i,...i", a, b)
+
+
+def lengths(a: Float32[ndarray, "*n 3"]) -> Float32[ndarray, "*n"]:
+    """Lengths of vectors along the last axis."""
+    return np.sqrt(dot(a, a))
+
+
 def geom_colours(model: "mujoco.MjModel") -> Float[ndarray, "n 4"]:
     """RGBA of each geom as MuJoCo draws it, a texture by its mean: the material's, unless the geom's own is not the default."""
     rgba = np.array(model.geom_rgba, float)

@@ -1,0 +1,83 @@
+"""The simulated cameras by name: which class, which settings, where they stand. Imports no heavy library until one is made."""
+
+from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
+
+from weldsim.frames import Transform
+from weldsim.mounts import KINECT_V2, X_WC_KINECT
+from weldsim.records import CameraIntrinsics
+from weldsim.sensor.base import DepthSensor
+from weldsim.sensor.d415 import D415Config, unit_intrinsics
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+    from numpy import ndarray
+
+    from weldsim.scene.world import World
+    from weldsim.sensor.active_stereo import D415StereoConfig
+    from weldsim.sensor.exact import TwinScene
+    from weldsim.sensor.kinect import KinectConfig
+
+SensorName = Literal["d415", "d415-stereo", "kinect", "exact"]
+EXACT_STEP = 1e-4  # [m] of depth that has no step of its own, in a PNG
+
+
+@runtime_checkable
+class SensorTables(Protocol):
+    """The settings of every camera; `weldsim.config.CellConfig` is one."""
+
+    @property
+    def sensor(self) -> D415Config: ...
+    @property
+    def stereo(self) -> "D415StereoConfig": ...
+    @property
+    def kinect(self) -> "KinectConfig": ...
+
+
+def make_sensor(
+    name: SensorName, scene: "TwinScene", intrinsics: CameraIntrinsics, tables: SensorTables, *, seed: int = 0
+) -> DepthSensor:
+    """The camera called `name`, looking at `scene`; close it after use.
+
+    Args:
+        intrinsics: nominal ones of the wrist camera; the Kinect has its own.
+        tables: settings of all of them.  seed: of the unit and its noise.
+    Raises:
+        SensorError: nothing draws here.
+    """
+    if name == "d415-stereo":
+        from weldsim.sensor.active_stereo import D415Stereo
+
+        return D415Stereo(scene, intrinsics, tables.stereo, seed=seed)
+    if name == "kinect":
+        from weldsim.sensor.time_of_flight import KinectV2
+
+        return KinectV2(scene, KINECT_V2, tables.kinect, seed=seed)
+
+    from weldsim.sensor.exact import ExactSensor
+    from weldsim.sensor.stereo import D415Fast
+
+    if name == "exact":
+        return ExactSensor(scene, intrinsics)
+    return D415Fast(ExactSensor(scene, unit_intrinsics(intrinsics, tables.sensor)), tables.sensor, seed=seed)
+
+
+def depth_step(name: SensorName, tables: SensorTables) -> float:
+    """The step [m] in which that camera's depth is stored, EXACT_STEP where it has none of its own."""
+    units = {"d415": tables.sensor.depth_unit, "d415-stereo": tables.stereo.depth_unit, "kinect": tables.kinect.depth_unit}
+    return units.get(name, 0.0) or EXACT_STEP
+
+
+def stations(world: "World", name: SensorName) -> tuple[Transform, ...]:
+    """X_BC of each exposure of that camera: the scene's views for the wrist camera, one from over the table for the Kinect."""
+    return (world.X_WB.inverse() @ X_WC_KINECT,) if name == "kinect" else world.views
+
+
+def posture(world: "World", name: SensorName, view: int) -> "Float[ndarray, '6']":
+    """Joint angles [rad] during an exposure: holding the wrist camera at its view, or turned away from under the Kinect.
+
+    Raises:
+        UnreachableError: a view that the arm cannot take.
+    """
+    from weldsim.scene.world import AWAY
+
+    return AWAY if name == "kinect" else world.view_joints(view)
