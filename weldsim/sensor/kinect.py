@@ -10,7 +10,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Complex64, Float32
+from jaxtyping import Bool, Complex64, Float, Float32
 from numpy import ndarray
 
 from weldsim.errors import ConfigError
@@ -73,7 +73,7 @@ class KinectConfig:
             )
 
 
-def axial_sigma(z: ndarray, angle: ndarray) -> ndarray:
+def axial_sigma(z: Float[ndarray, "*n"], angle: Float[ndarray, "*n"]) -> Float[ndarray, "*n"]:
     """Standard deviation of depth [m] at depth z [m] on a surface turned by `angle` [rad] from facing the camera.
 
     Fankhauser et al. 2015: 1.5 - 0.5 z + 0.3 z^2 + 0.1 z^1.5 angle^2 / (pi/2 - angle)^2 millimetres, z in metres.
