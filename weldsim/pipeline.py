@@ -135,9 +135,11 @@ def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float
     """Index of the seam that is meant: the best one, or the `number`-th from 1, or the one nearest to a point in B [m].
 
     Raises:
-        InputError: a number that no seam has.
+        InputError: a number that no seam has, a point that is not finite.
     """
     count = len(findings.seams)
+    if near is not None and not np.isfinite(near).all():
+        raise InputError(f"near {tuple(near)}: three finite numbers in metres are needed", near=tuple(near))
     if near is not None and count:
         distances = [project(np.array([near], float), seam.points_B)[0][0] for seam in findings.seams]
         return int(np.argmin(distances))

@@ -74,3 +74,5 @@ def test_the_seam_that_is_meant():
     for number in (0, 4, -1):
         with pytest.raises(InputError, match="3 found"):
             pick(FOUND, number)
+    with pytest.raises(InputError, match="finite"):
+        pick(FOUND, near=(float("nan"), 0.0, 0.0))

@@ -1,17 +1,19 @@
 """Places to write to, tried before the long work."""
 
+import os
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
 from weldsim.errors import InputError, OutputError
+from weldsim.output import place_of
 
 
 def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None] = ()) -> None:
     """Nothing, when every output can be written; nothing is left behind.
 
     Raises:
-        OutputError: a folder where a file is meant, a folder that is missing or cannot be written.
+        OutputError: a folder or device where a file is meant, a folder that is missing or cannot be written.
         InputError: an output that is given twice or would overwrite an input.
     """
     taken = {path.resolve(): "is read by this command" for path in inputs if path is not None}
@@ -22,9 +24,8 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None] 
         if place in taken:
             raise InputError(f"{path}: {taken[place]}; write elsewhere", path=str(path))
         taken[place] = "is given twice"
-        if path.is_dir():
-            raise OutputError(f"{path}: is a folder; give a file name", path=str(path))
-        check_folder(path.parent, path)
+        file = place_of(path)
+        check_folder(path.parent if file == Path(os.path.abspath(path)) else file.parent, path)
 
 
 def check_folder(folder: Path, path: Path) -> None:

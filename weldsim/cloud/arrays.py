@@ -125,7 +125,8 @@ def _cloud(array: ndarray, arrays: dict[str, Callable[[], ndarray]]) -> RawCloud
         check_count(len(flat))
         return from_columns({name.lower(): flat[name] for name in array.dtype.names if _is_column(flat[name])})
     if array.ndim < 2 or array.shape[-1] < 3 or array.shape[-1] > 64:
-        raise Unreadable(f"its array has shape {array.shape}; points are (n, 3)")
+        image = "; a depth image needs its intrinsics beside it (--intrinsics)" if array.ndim == 2 and min(array.shape) > 3 else ""
+        raise Unreadable(f"its array has shape {array.shape}; points are (n, 3){image}")
     points = _numbers(array.reshape(-1, array.shape[-1])[:, :3])
     check_count(len(points))
 

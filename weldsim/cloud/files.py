@@ -29,6 +29,7 @@ __all__ = ["LengthUnit", "check_plannable", "read_cloud", "read_depth_frame", "w
 LengthUnit = Literal["m", "cm", "mm", "in"]
 _METRES: dict[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 MIN_SPAN = 0.005  # [m] a cloud smaller than this was scaled down twice, or shows no weld
+MAX_GRAIN = 0.0002  # [m] between neighbouring coordinates of a file in single precision
 MIN_POINTS = 100  # fewer cannot show a groove
 MIN_BREADTH = 0.001  # [m] rms breadth across the longest direction below which the points are a line
 
@@ -42,7 +43,7 @@ def read_cloud(path: str | Path, *, unit: LengthUnit = "m", viewpoint: Sequence[
         viewpoint: where the camera stood (3,) [m] in the same frame; it outranks what the file says.
     Raises:
         CloudFileError: missing, unreadable, cut off, or no cloud.
-        CloudError: no finite point, or an extent that shows that `unit` is wrong.
+        CloudError: no finite point, coordinates too coarse, or an extent that shows that `unit` is wrong.
     """
     data = read_bytes(path)
     try:
@@ -55,6 +56,7 @@ def read_cloud(path: str | Path, *, unit: LengthUnit = "m", viewpoint: Sequence[
     if dropped == total:
         raise CloudError(f"{path}: none of its {total} points is finite", path=str(path), total=total)
     with np.errstate(over="ignore", invalid="ignore"):
+        _check_grain(str(path), raw.points[keep] if dropped else raw.points, _METRES[unit])
         points = (raw.points if dropped == 0 else raw.points[keep]) * _METRES[unit]
         _check_extent(str(path), points, unit, dropped)
     viewpoints, view = _viewpoints(raw, _METRES[unit], viewpoint)
@@ -75,6 +77,10 @@ def _reader(data: bytes) -> Callable[[bytes], RawCloud]:
         return read_array_cloud
     if data[:4] == b"\x89PNG":
         raise Unreadable("it is a PNG image; a depth image needs its intrinsics beside it (--intrinsics)")
+    if data[:2] == b"\x1f\x8b":
+        raise Unreadable("it is gzip-compressed; unpack it first")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise Unreadable("it is UTF-16 text; save it as UTF-8")
     head = data[:4096]
     if head.startswith((b"# .PCD", b"VERSION")) or (b"\nFIELDS" in head and b"\nSIZE" in head):
         return read_pcd
@@ -85,6 +91,20 @@ def _finite_rows(points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
     """Which points are finite."""
     x, y, z = np.isfinite(points).T
     return x & y & z
+
+
+def _check_grain(path: str, points: Float[ndarray, "n 3"], scale: float) -> None:
+    """Raises CloudError where single precision, so far from the origin, leaves less than the shape of a groove."""
+    reach = float(np.abs(points).max())
+    grain = float(np.spacing(np.float32(min(reach, 1e30)))) * scale
+    if grain > MAX_GRAIN and (points.astype(np.float32) == points).all():
+        raise CloudError(
+            f"{path}: its single-precision coordinates reach {reach * scale:.3g} m, where they lie {grain * 1e3:.2g} mm apart"
+            f" (limit {MAX_GRAIN * 1e3:g} mm): subtract the offset before saving, or save doubles",
+            path=path,
+            grain=grain,
+            limit=MAX_GRAIN,
+        )
 
 
 def _check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: int) -> None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Radian, Second
+from weldsim.quantity import Radian, Second, require_within
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class SimulationConfig:
         for name in ("period", "timestep", "stop_deceleration", "frame_period"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"simulation.{name} = {getattr(self, name)}: must be positive", key=f"simulation.{name}")
+        require_within(self, {"period": (5e-4, 0.1), "timestep": (1e-5, 0.1), "stop_deceleration": (0.01, 1e4)}, "simulation")
         if self.timestep > min(self.period, 0.002):
             raise ConfigError(
                 f"simulation.timestep = {self.timestep} s: at most {min(self.period, 0.002)} s, or the servos turn unstable",
@@ -52,3 +53,4 @@ class ExecutionConfig:
             raise ConfigError(
                 "execution: start_tolerance must be positive and settle not negative", key="execution.start_tolerance"
             )
+        require_within(self, {"settle": (0.0, 60.0)}, "execution")

@@ -3,7 +3,28 @@
 from dataclasses import dataclass
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre, RadianPerSecond, Second
+from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre, RadianPerSecond, Second, require_within
+
+# Beyond these a plan takes for ever, or has more samples than memory, without being of use to any arm.
+RANGES = {
+    "period": (5e-4, 0.1),
+    "approach": (0.0, 1.0),
+    "lead_speed": (1e-4, 5.0),
+    "tip_acceleration": (1e-3, 1e3),
+    "tip_jerk": (1e-2, 1e6),
+    "joint_speed": (1e-3, 10.0),
+    "joint_acceleration": (1e-3, 1e3),
+    "joint_jerk": (1e-2, 1e5),
+    "joint_speed_limit": (1e-3, 100.0),
+    "joint_acceleration_limit": (1e-3, 1e4),
+    "limit_margin": (0.0, 3.0),
+    "grid": (5e-5, 0.1),
+    "spline_tolerance": (1e-8, 0.01),
+    "position_tolerance": (1e-8, 0.01),
+    "axis_tolerance": (1e-8, 1.0),
+    "rolls": (1, 3600),
+    "candidates": (1, 1000),
+}
 
 
 @dataclass(frozen=True)
@@ -61,6 +82,7 @@ class MotionConfig:
         for name in positive.split():
             if not getattr(self, name) > 0:
                 raise ConfigError(f"motion.{name} = {getattr(self, name)}: must be positive", key=f"motion.{name}")
+        require_within(self, RANGES, "motion")
         for name in ("approach", "limit_margin", "clearance"):
             if getattr(self, name) < 0:
                 raise ConfigError(f"motion.{name} = {getattr(self, name)}: must not be negative", key=f"motion.{name}")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre
+from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre, require_within
 
 DEGREE_PER_MM: RadianPerMetre = 17.453292519943295  # 1 deg/mm
 STEEPEST: Radian = 1.0471975511965976  # 60 deg
@@ -56,6 +56,7 @@ class PathConfig:
         for name in ("step", "speed", "turn_limit", "ctwd", "nominal_ctwd"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must be positive", key=name, value=getattr(self, name))
+        require_within(self, {"ctwd": (1e-3, 0.1), "nominal_ctwd": (1e-3, 0.1), "speed": (1e-4, 1.0)})
         for name in ("smoothing", "start_trim", "end_trim"):
             if not getattr(self, name) >= 0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} m must not be negative", key=name, value=getattr(self, name))

@@ -223,9 +223,10 @@ def _check_seam(seam: Any, where: str) -> None:
     s = _array([pose.get("s") for pose in poses], (), f"{where}.s")
     _need(bool((np.diff(s) >= 0).all()), where, "s decreases along the poses")
     for name, values in (("points", points), ("position", position)):
-        reach = float(np.abs(values).max())
-        limit = f"{reach:.4g} m from the base (limit {MILLIMETRE_SPAN:g} m): looks like millimetres"
-        _need(reach <= MILLIMETRE_SPAN, f"{where}.{name}", limit)
+        span = float(np.ptp(values, axis=0).max())
+        _need(
+            span <= MILLIMETRE_SPAN, f"{where}.{name}", f"spans {span:.4g} m (limit {MILLIMETRE_SPAN:g} m): looks like millimetres"
+        )
     defect = np.abs(np.linalg.norm(quaternion, axis=1) - 1.0)
     worst = int(defect.argmax())
     _need(

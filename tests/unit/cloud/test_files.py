@@ -1,5 +1,6 @@
 """Every cloud format as other programs write it, and the one line that refuses what is none."""
 
+import gzip
 import struct
 import subprocess
 import sys
@@ -306,3 +307,28 @@ def test_reading_a_cloud_loads_no_heavy_library() -> None:
 def test_errors_share_a_root() -> None:
     assert issubclass(CloudFileError, WeldsimError)
     assert CloudFileError.exit_code == CloudError.exit_code == 2
+
+
+def test_packed_and_wide_text_are_named(tmp_path):
+    (tmp_path / "a.ply.gz").write_bytes(gzip.compress(b"ply\n"))
+    with pytest.raises(CloudFileError, match="unpack it first"):
+        read_cloud(tmp_path / "a.ply.gz")
+    (tmp_path / "a.xyz").write_text("0.1 0.2 0.3\n" * 9, encoding="utf-16")
+    with pytest.raises(CloudFileError, match="UTF-8"):
+        read_cloud(tmp_path / "a.xyz")
+    np.save(tmp_path / "depth.npy", np.full((96, 128), 0.4))
+    with pytest.raises(CloudFileError, match="--intrinsics"):
+        read_cloud(tmp_path / "depth.npy")
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_survey_coordinates_need_doubles(tmp_path, unit):
+    points = np.random.default_rng(0).uniform(0, 0.3, (500, 3)) + np.array([500_000.0, 4_500_000.0, 100.0])
+    scale = {"m": 1.0, "mm": 1e3}[unit]
+    np.save(tmp_path / "double.npy", points * scale)
+    assert np.allclose(read_cloud(tmp_path / "double.npy", unit=unit).points, points, rtol=0, atol=1e-8)
+    np.save(tmp_path / "single.npy", (points * scale).astype(np.float32))
+    with pytest.raises(CloudError, match="single-precision coordinates reach"):
+        read_cloud(tmp_path / "single.npy", unit=unit)
+    np.save(tmp_path / "near.npy", (points - [499_900.0, 4_499_900.0, 0.0]).astype(np.float32) * np.float32(scale))
+    assert len(read_cloud(tmp_path / "near.npy", unit=unit)) == 500

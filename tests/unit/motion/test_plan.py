@@ -5,7 +5,7 @@ import pytest
 
 from tests.torch_paths import START, flat_curve, random_path, torch_path
 from weldsim.curves import arc_length
-from weldsim.errors import MotionError, UnreachableError
+from weldsim.errors import ConfigError, MotionError, UnreachableError
 from weldsim.frames import Transform
 from weldsim.kinematics import inverse, torch_pose
 from weldsim.motion.config import MotionConfig
@@ -227,3 +227,12 @@ def test_the_arm_goes_around_a_ring() -> None:
     assert motion.position_error < 0.05e-3
     # Rotation about the wire is free, so no joint is wound up on the way around.
     assert np.abs(motion.trajectory.q[weld][-1] - motion.trajectory.q[weld][0]).max() < 0.02
+
+
+@pytest.mark.parametrize("name", ["period", "tip_acceleration", "joint_speed", "joint_jerk", "grid", "limit_margin", "rolls"])
+@pytest.mark.parametrize("value", [1e-9, 1e9])
+def test_limits_of_no_use_to_an_arm_are_refused_at_once(name: str, value: float) -> None:
+    if name == "limit_margin" and value < 1:
+        value = -1.0
+    with pytest.raises(ConfigError, match=f"motion.{name}"):
+        MotionConfig(**{name: value})

@@ -258,3 +258,9 @@ def test_what_was_asked_is_where_the_path_is(seed, reverse):
     wanted = unit(interpolate(found.s, leaned(known, path, config).bisectors_B, s))
     assert turn_between(path.X_BT.R[:, :, 2], wanted).max() < 2e-3
     assert leaned(known, path, PathConfig()) is known
+
+
+@pytest.mark.parametrize("name", ["ctwd", "nominal_ctwd"])
+def test_a_contact_tip_is_near_its_work(name: str) -> None:
+    with pytest.raises(ConfigError, match=r"outside 0\.001 to 0\.1"):
+        PathConfig(**{name: 1e9})
