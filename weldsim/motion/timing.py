@@ -48,7 +48,10 @@ def _sample(trajectory: ruckig.Trajectory, start: float, period: float, n: int) 
 
 def _solve(otg: ruckig.Ruckig, request: ruckig.InputParameter, dofs: int, what: str) -> ruckig.Trajectory:
     trajectory = ruckig.Trajectory(dofs)
-    result = otg.calculate(request, trajectory)
+    try:
+        result = otg.calculate(request, trajectory)
+    except (ruckig.RuckigError, ValueError) as error:  # a result code that its Python enum does not know is a ValueError
+        raise MotionError(f"{what}: no jerk-limited profile; check the limits in the motion config", result=str(error)) from error
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise MotionError(f"{what}: no jerk-limited profile ({result}); check the limits in the motion config", result=str(result))
     return trajectory
