@@ -1,9 +1,40 @@
-"""CloudConfig: how a cloud is cleaned before a stage looks at it (read by `weldsim.cloud.filters.prepare`)."""
+"""CloudConfig: how views become one cloud (`weldsim.cloud.views`) and how it is cleaned (`weldsim.cloud.filters.prepare`)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Metre
+from weldsim.quantity import Metre, Radian
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegisterConfig:
+    """How large the mistakes of a cell are from which views are lined up (read by `weldsim.cloud.register`)."""
+
+    enabled: bool = True
+    """Whether several views are lined up at all."""
+
+    offset_sigma: Metre = 0.0035
+    """Standard deviation of a view's offset along its optical axis; the thesis's ten distances (table 6.2) scatter so."""
+
+    view_sigma: Metre = 0.0005
+    """Standard deviation of a view's other offsets, across the axis: the arm's own errors."""
+
+    view_turn: Radian = 0.0017
+    """Standard deviation of a view's turn about each axis (0.1 deg)."""
+
+    hand_eye_sigma: Metre = 0.001
+    """Standard deviation of the hand-eye calibration along each axis; it moves every view alike in its camera's frame."""
+
+    hand_eye_turn: Radian = 0.0035
+    """Standard deviation of the hand-eye calibration about each axis (0.2 deg)."""
+
+    double_walls: bool = True
+    """Whether, where two views still show one surface in two places, the worse-seen one is dropped."""
+
+    def __post_init__(self) -> None:
+        for name in ("offset_sigma", "view_sigma", "view_turn", "hand_eye_sigma", "hand_eye_turn"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"cloud.register.{name} = {getattr(self, name):g}: must be positive", key=name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +55,9 @@ class CloudConfig:
 
     outlier_neighbours: int = 4
     """How many neighbours a point needs within `outlier_radius`."""
+
+    register: RegisterConfig = field(default_factory=RegisterConfig)
+    """How several views are lined up."""
 
     def __post_init__(self) -> None:
         if (self.crop_min is None) != (self.crop_max is None):

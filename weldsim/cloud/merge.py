@@ -5,13 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from weldsim.errors import CloudError
+from weldsim.frames import Transform
 from weldsim.records import PointCloud
 
 
 def merge(clouds: Sequence[PointCloud]) -> PointCloud:
     """The points of all clouds, in order, each with the viewpoint that saw it; a single cloud is returned as it is.
 
-    Normals and colours are kept where every cloud has them. Pixels are lost: they belong to one image.
+    Normals, colours and pixels are kept where every cloud has them; a pixel then is one of its view's image, and X_BC is a
+    batch, one pose a view.
 
     Raises:
         CloudError: no cloud, different frames, or one of several clouds without exactly one viewpoint.
@@ -27,6 +29,9 @@ def merge(clouds: Sequence[PointCloud]) -> PointCloud:
             raise CloudError(f"merge: cloud {i} has {len(cloud.viewpoints)} viewpoints, one is needed", index=i)
     normals = [cloud.normals for cloud in clouds if cloud.normals is not None]
     colours = [cloud.colours for cloud in clouds if cloud.colours is not None]
+    cameras = [cloud.X_BC for cloud in clouds if cloud.X_BC is not None and not cloud.X_BC.batch]
+    pixels = [cloud.pixel for cloud in clouds if cloud.pixel is not None and cloud.intrinsics == clouds[0].intrinsics]
+    imaged = len(cameras) == len(pixels) == len(clouds)
     return PointCloud(
         points=np.concatenate([cloud.points for cloud in clouds]),
         frame=clouds[0].frame,
@@ -34,4 +39,7 @@ def merge(clouds: Sequence[PointCloud]) -> PointCloud:
         colours=np.concatenate(colours) if len(colours) == len(clouds) else None,
         viewpoints=np.concatenate([cloud.viewpoints for cloud in clouds]),
         view=np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds]),
+        pixel=np.concatenate(pixels) if imaged else None,
+        intrinsics=clouds[0].intrinsics if imaged else None,
+        X_BC=Transform("BC", np.stack([X.R for X in cameras]), np.stack([X.p for X in cameras])) if imaged else None,
     )

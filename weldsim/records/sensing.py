@@ -87,8 +87,8 @@ class PointCloud:
         colours: (n, 3) in [0, 1], or None.
         viewpoints: (k, 3) [m] where the cameras stood, in the same frame; k = 0 when unknown.
         view: (n,) which viewpoint saw each point; None when k <= 1.
-        pixel: (n,) row * width + column of each point in its depth image (single organised view), or None.
-        intrinsics, X_BC: of that depth image, or None.
+        pixel: (n,) row * width + column of each point in the depth image of its view, or None.
+        intrinsics, X_BC: of that depth image, or None; X_BC is a batch, one pose a viewpoint, where there are several.
     """
 
     points: Float[ndarray, "n 3"]

@@ -1,0 +1,32 @@
+"""Several views as one cloud: lined up, without double walls, merged."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from weldsim.cloud.config import RegisterConfig
+from weldsim.cloud.merge import merge
+from weldsim.cloud.register import Registration, register
+from weldsim.cloud.walls import double_walls
+from weldsim.records import PointCloud
+
+
+def merge_views(clouds: Sequence[PointCloud], config: RegisterConfig | None = None) -> tuple[PointCloud, Registration | None]:
+    """One cloud in B from organised views of it, and how they were lined up; a single view is returned as it is, with None.
+
+    Raises:
+        CloudError: no cloud, or one that does not know its pixels.
+    """
+    config = config or RegisterConfig()
+    views, found = register(clouds, config)
+    if len(views) > 1 and config.double_walls:
+        views = tuple(view.select(~double) for view, double in zip(views, double_walls(views), strict=True))
+    return merge(views), found
+
+
+def dropped(clouds: Sequence[PointCloud], merged: PointCloud) -> tuple[int, ...]:
+    """How many points of each view the merged cloud has not."""
+    if merged.view is None:
+        return tuple(len(cloud) - len(merged) for cloud in clouds)
+    kept = np.bincount(merged.view, minlength=len(clouds))
+    return tuple(len(cloud) - int(number) for cloud, number in zip(clouds, kept, strict=True))
