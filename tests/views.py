@@ -1,7 +1,6 @@
 """A block or plate with a groove over one or three of its faces, seen by several cameras whose poses are not quite true.
 
-Rays are cast against the solid and a table; each view then gets the errors of a real cell: an offset along its own optical
-axis, a mistaken hand-eye calibration (the same in every camera frame), noise. Nothing of it needs the simulator.
+Rays are cast against the solid and a table; each view then gets the errors of a real cell: an offset of its depth, a mistaken hand-eye calibration (the same in every camera frame), noise. Nothing of it needs the simulator.
 """
 
 from collections.abc import Sequence
@@ -10,7 +9,7 @@ from typing import Literal, NamedTuple
 import manifold3d
 import numpy as np
 import open3d as o3d
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tests.clouds import d415_depth
@@ -54,7 +53,11 @@ class Block(NamedTuple):
     def seam(self, step: float = 1e-3) -> Float[ndarray, "n 3"]:
         """Opening's centre line in B, from one foot over the top to the other."""
         x, _, z = self.size
-        corners = [(-x / 2, 0.0, 0.0), (-x / 2, 0.0, z), (x / 2, 0.0, z), (x / 2, 0.0, 0.0)] if self.sides else [(-x / 2, 0, z), (x / 2, 0, z)]
+        corners = (
+            [(-x / 2, 0.0, 0.0), (-x / 2, 0.0, z), (x / 2, 0.0, z), (x / 2, 0.0, 0.0)]
+            if self.sides
+            else [(-x / 2, 0, z), (x / 2, 0, z)]
+        )
         lines = [
             np.linspace(a, b, max(2, int(np.ceil(np.linalg.norm(np.subtract(b, a)) / step)) + 1))
             for a, b in zip(corners[:-1], corners[1:], strict=True)
@@ -63,8 +66,8 @@ class Block(NamedTuple):
 
 
 class Scan(NamedTuple):
-    """clouds as a cell with mistakes sees them; true: X_BC of each view; shown: X_BC as reported; offsets [m] along the axes;
-    moved: for each view the true motion X_BB that would put its cloud right; groove: mask a cloud."""
+    """Attributes: clouds and frames as a cell with mistakes sees them.  true: X_BC of each view.  offsets: of its depth [m].
+    groove: for each cloud, which points lie in the groove."""
 
     clouds: list[PointCloud]
     frames: list[DepthFrame]
@@ -72,8 +75,34 @@ class Scan(NamedTuple):
     offsets: Float[ndarray, "k"]
     groove: list[Bool[ndarray, "_"]]
 
+    def places(self, view: int, every: int = 7) -> tuple[Float[ndarray, "n 3"], Int[ndarray, "n"]]:
+        """Where groove points of a view would lie in B without the cell's mistakes (noise apart), and their rows."""
+        cloud, rows = self.clouds[view], np.flatnonzero(self.groove[view])[::every]
+        seen = self.frames[view].X_BC.inverse().points(cloud.points[rows])
+        return self.true[view].points(seen * (1 - self.offsets[view] / seen[:, 2:])), rows
 
-def look(target: Float[ndarray, "3"], towards: Float[ndarray, "3"], standoff: float, up: Sequence[float] = (0.0, 1.0, 0.0)) -> Transform:
+    def misalignment(self, clouds: Sequence[PointCloud]) -> float:
+        """Rms distance of the views' grooves from each other [m]: what is left after the motion common to all is taken out."""
+        right, now = zip(*((self.places(i)[0], cloud.points[self.places(i)[1]]) for i, cloud in enumerate(clouds)), strict=True)
+        return float(np.sqrt(np.mean(fit_motion(np.concatenate(right), np.concatenate(now))[1] ** 2)))
+
+    def error(self, clouds: Sequence[PointCloud]) -> float:
+        """Rms distance of the grooves from where they are [m]."""
+        gaps = [cloud.points[self.places(i)[1]] - self.places(i)[0] for i, cloud in enumerate(clouds)]
+        return float(np.sqrt((np.concatenate(gaps) ** 2).sum(axis=1).mean()))
+
+
+def fit_motion(a: Float[ndarray, "n 3"], b: Float[ndarray, "n 3"]) -> tuple[Transform, Float[ndarray, "n"]]:
+    """The rigid motion that best carries points a to b (singular value decomposition), and the distances left [m]."""
+    u, _, vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))
+    R = vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+    X = Transform("BB", R, b.mean(axis=0) - R @ a.mean(axis=0))
+    return X, np.linalg.norm(b - X.points(a), axis=1)
+
+
+def look(
+    target: Float[ndarray, "3"], towards: Float[ndarray, "3"], standoff: float, up: Sequence[float] = (0.0, 1.0, 0.0)
+) -> Transform:
     """X_BC of a camera at target + standoff * towards, looking at it."""
     z = -unit(np.asarray(towards, float))
     x = unit(np.cross(np.asarray(up, float), z))
@@ -86,7 +115,9 @@ def fan(block: Block, angles: Sequence[float] = FAN, standoff: float = 0.42, lea
     poses = []
     for angle in np.radians(angles):
         towards = np.array([np.sin(angle), np.sin(lean), np.cos(angle)])
-        aim = np.array([np.clip(np.sin(angle) * 1.2, -1, 1) * x / 2, 0.0, z - (max(0.0, abs(np.sin(angle)) - 0.6) * z if block.sides else 0.0)])
+        aim = np.array(
+            [np.clip(np.sin(angle) * 1.2, -1, 1) * x / 2, 0.0, z - (max(0.0, abs(np.sin(angle)) - 0.6) * z if block.sides else 0.0)]
+        )
         poses.append(look(CENTRE + aim, towards, standoff))
     return poses
 
@@ -108,7 +139,7 @@ def scan(
     """What the views see.
 
     Args:
-        noise, sigma: of depth [m].  offset: standard deviation along each optical axis [m], or `offsets` themselves.
+        noise, sigma: of depth [m].  offset: standard deviation of each view's depth offset [m], or `offsets` themselves.
         hand_eye, hand_eye_turn: length [m] and angle [rad] of the mistake between flange and camera, alike in all views.
     """
     block = block or Block()

@@ -17,7 +17,8 @@ from numpy import ndarray
 from weldsim.cloud.deproject import deproject
 from weldsim.cloud.files import check_plannable
 from weldsim.cloud.filters import prepare
-from weldsim.cloud.merge import merge
+from weldsim.cloud.register import Registration
+from weldsim.cloud.views import merge_views
 from weldsim.config import CellConfig, digest
 from weldsim.curves import project
 from weldsim.errors import InputError, PathError
@@ -66,12 +67,14 @@ class Sighting:
 
     Attributes:
         world: the compiled scene.  captures: one a view.  cloud: all views in the base, as perception receives it.
+        registration: how several views were lined up; None for one.
         seed, sensor: what it was seen with.  timing: seconds a stage.
     """
 
     world: "World"
     captures: tuple["Capture", ...]
     cloud: PointCloud
+    registration: Registration | None
     seed: int
     sensor: SensorName
     timing: dict[str, float]
@@ -92,11 +95,12 @@ class PlanResult:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunResult:
-    """A whole job on the twin. Attributes: world; captures, one a view; plan; welded, the index of the seam that was welded;
-    motion and log, None where there was nothing to weld; report."""
+    """A whole job on the twin. Attributes: world; captures, one a view; registration, how they were lined up, None for one;
+    plan; welded, the index of the seam that was welded; motion and log, None where there was nothing to weld; report."""
 
     world: "World"
     captures: tuple["Capture", ...]
+    registration: Registration | None
     plan: PlanResult
     welded: int
     motion: "MotionPlan | None"
@@ -184,7 +188,7 @@ def look(
     world: "World | None" = None,
     clock: Clock | None = None,
 ) -> Sighting:
-    """The scene built and scanned from all its views, merged into one cloud in the robot base.
+    """The scene built and scanned from all its views, which are lined up and merged into one cloud in the robot base.
 
     Args:
         scene: what stands on the table.  config: everything else.
@@ -201,8 +205,10 @@ def look(
     with clock.stage("sensor"):
         captures = scan(world, config, seed, sensor)
     with clock.stage("cloud"):
-        cloud = merge([deproject(capture.frame) for capture in captures])
-    return Sighting(world=world, captures=captures, cloud=cloud, seed=seed, sensor=sensor, timing=dict(clock.seconds))
+        cloud, found = merge_views([deproject(capture.frame) for capture in captures], config.cloud.register)
+    return Sighting(
+        world=world, captures=captures, cloud=cloud, registration=found, seed=seed, sensor=sensor, timing=dict(clock.seconds)
+    )
 
 
 def run(
@@ -265,7 +271,7 @@ def finish(
             scene=world.config.name,
             log=None if log is None else replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
             known=tuple(seam if path is None else leaned(seam, path, config.path) for seam in world.known_seams),
-            true_region=true_region(seen.captures, seen.cloud, result.cloud),
+            true_region=true_region(seen.captures, result.cloud),
             welded=welded,
             unplanned=unplanned(result),
             trims=(config.path.start_trim, config.path.end_trim),
@@ -274,7 +280,16 @@ def finish(
             config=config.report,
         )
     report = replace(report, timing=dict(clock.seconds))
-    return RunResult(world=world, captures=seen.captures, plan=result, welded=welded, motion=motion, log=log, report=report)
+    return RunResult(
+        world=world,
+        captures=seen.captures,
+        registration=seen.registration,
+        plan=result,
+        welded=welded,
+        motion=motion,
+        log=log,
+        report=report,
+    )
 
 
 def unplanned(result: PlanResult) -> tuple[str, ...]:
@@ -322,8 +337,8 @@ def _weld(
     return motion, log
 
 
-def true_region(captures: tuple["Capture", ...], cloud: PointCloud, kept: PointCloud) -> Bool[ndarray, "n"] | None:
-    """For each point kept, whether it lies in a groove; None where points were merged and cannot be told apart."""
+def true_region(captures: tuple["Capture", ...], kept: PointCloud) -> Bool[ndarray, "n"] | None:
+    """For each point kept, whether its pixel shows a groove; None where points do not know their pixels (a voxel grid)."""
     from weldsim.sensor.base import Label
 
     masks = []
@@ -331,9 +346,8 @@ def true_region(captures: tuple["Capture", ...], cloud: PointCloud, kept: PointC
         if capture.truth is None:
             return None
         masks.append(capture.truth.labels.reshape(-1) == Label.GROOVE)
-    if len(captures) == 1:
-        return None if kept.pixel is None else masks[0][kept.pixel]
-    if len(kept) != len(cloud):
+    if kept.pixel is None:
         return None
-    seen = [np.isfinite(capture.frame.depth.reshape(-1)) for capture in captures]
-    return np.concatenate([mask[returns] for mask, returns in zip(masks, seen, strict=True)])
+    if kept.view is None:
+        return masks[0][kept.pixel] if len(masks) == 1 else None
+    return np.stack(masks)[kept.view, kept.pixel]

@@ -1,6 +1,7 @@
 """Clouds of several views as one."""
 
 from collections.abc import Sequence
+from dataclasses import astuple
 
 import numpy as np
 
@@ -30,8 +31,9 @@ def merge(clouds: Sequence[PointCloud]) -> PointCloud:
     normals = [cloud.normals for cloud in clouds if cloud.normals is not None]
     colours = [cloud.colours for cloud in clouds if cloud.colours is not None]
     cameras = [cloud.X_BC for cloud in clouds if cloud.X_BC is not None and not cloud.X_BC.batch]
-    pixels = [cloud.pixel for cloud in clouds if cloud.pixel is not None and cloud.intrinsics == clouds[0].intrinsics]
-    imaged = len(cameras) == len(pixels) == len(clouds)
+    pixels = [cloud.pixel for cloud in clouds if cloud.pixel is not None]
+    kinds = {astuple(cloud.intrinsics) for cloud in clouds if cloud.intrinsics is not None}
+    imaged = len(cameras) == len(pixels) == len(clouds) and len(kinds) == 1
     return PointCloud(
         points=np.concatenate([cloud.points for cloud in clouds]),
         frame=clouds[0].frame,

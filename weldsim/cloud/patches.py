@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from weldsim.errors import CloudError
+from weldsim.frames import unit
 from weldsim.records import PointCloud
 
 SIDE = 8  # [px] of a patch: wider than the support window of a stereo matcher rounds an edge off
@@ -14,6 +15,10 @@ FILLED = 0.6  # share of its pixels a patch needs
 ROUGHER, SMOOTH = 2.5, 1e-4  # a patch may be this many times rougher than the view's median, and this rough in any case [m]
 TURNS = (0.45, 0.25, 0.18)  # [rad] normals this alike are averaged, pass by pass
 LEVEL = 0.02  # share of the distance by which neighbours on one surface may lie out of each other's plane
+SIGMAS, BEND = (
+    3.0,
+    1e-4,
+)  # neighbours either side have their middle this near to a patch: in its sigmas, or in metres for bent parts
 FLOOR = 5e-5  # [m] least standard deviation of a patch
 
 
@@ -42,13 +47,19 @@ class Patches:
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """The depth image cut into squares of SIDE pixels, h down and w across. Attributes:
-    valid: (h, w) whether enough pixels returned.  centre, normal: (h, w, 3) in C.  rough: (h, w) rms distance from its plane [m].
+    valid: (h, w) whether enough pixels returned.  centre: (h, w, 3) on the square's plane, in C [m].
+    plane: (h, w, 3) of that plane p in C: plane @ p = 1 [1/m].  rough: (h, w) rms distance of the points from it [m].
     """
 
     valid: Bool[ndarray, "h w"]
     centre: Float[ndarray, "h w 3"]
-    normal: Float[ndarray, "h w 3"]
+    plane: Float[ndarray, "h w 3"]
     rough: Float[ndarray, "h w"]
+
+    @property
+    def normal(self) -> Float[ndarray, "h w 3"]:
+        """Unit normals towards the camera; zero where not valid."""
+        return np.where(self.valid[..., None], -unit(self.plane), 0.0)
 
 
 def planar_patches(cloud: PointCloud) -> Patches:
@@ -70,6 +81,7 @@ def planar_patches(cloud: PointCloud) -> Patches:
         inner &= _shifted(flat, rows, columns)
     normal = _smooth_normals(blocks, flat)
     sigma = _noise(blocks, normal, inner)
+    inner &= _straight(blocks, normal, sigma)
     pitch = SIDE * z / (cloud.intrinsics.fx if cloud.intrinsics else 1.0)
     facing = np.abs(np.einsum("hwi,hwi->hw", normal, blocks.centre)) / np.maximum(np.linalg.norm(blocks.centre, axis=-1), 1e-9)
     return Patches(
@@ -81,32 +93,43 @@ def planar_patches(cloud: PointCloud) -> Patches:
 
 
 def cut_in_blocks(cloud: PointCloud) -> Blocks:
-    """The plane of each square of the depth image (moments of its points, least eigenvector). Raises CloudError."""
-    if cloud.pixel is None or cloud.intrinsics is None or cloud.X_BC is None or cloud.X_BC.batch:
+    """The plane of each square of the depth image.
+
+    On a plane inverse depth is affine in image coordinates, which are free of noise: fitted so, the plane is not tilted by
+    noise along the line of sight, as the least eigenvector of the points' covariance is.
+
+    Raises:
+        CloudError: the cloud does not know its pixels or its one camera.
+    """
+    camera, X_BC = cloud.intrinsics, cloud.X_BC
+    if cloud.pixel is None or camera is None or X_BC is None or X_BC.batch:
         raise CloudError("register: a view does not know its pixels and its one camera; give clouds as deprojected")
-    height, width = cloud.intrinsics.height, cloud.intrinsics.width
-    h, w = height // SIDE, width // SIDE
-    local = (cloud.points - cloud.X_BC.p) @ cloud.X_BC.R
-    filled = np.zeros(height * width)
-    filled[cloud.pixel] = 1.0
-    mask = _in_cells(filled.reshape(height, width), h, w)
-    count = mask.sum(axis=-1)
-    mean, offset = np.empty((h, w, 3)), []
-    for axis in range(3):
-        image = np.zeros(height * width)
-        image[cloud.pixel] = local[:, axis]
-        cells = _in_cells(image.reshape(height, width), h, w)
-        mean[..., axis] = cells.sum(axis=-1) / np.maximum(count, 1)
-        offset.append((cells - mean[..., axis, None]) * mask)
-    covariance = np.empty((h, w, 3, 3))
-    for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
-        covariance[..., i, j] = covariance[..., j, i] = np.einsum("hwk,hwk->hw", offset[i], offset[j]) / np.maximum(count, 1)
-    values, vectors = np.linalg.eigh(covariance)
-    normal = vectors[..., 0]
-    normal = normal * -np.sign(np.einsum("hwi,hwi->hw", normal, mean))[..., None]
-    # A patch seen so obliquely that it is a line has no plane.
-    valid = (count >= FILLED * SIDE * SIDE) & (values[..., 1] > 4 * np.maximum(values[..., 0], 0.0))
-    return Blocks(valid, mean, normal, np.sqrt(np.maximum(values[..., 0], 0.0)))
+    h, w = camera.height // SIDE, camera.width // SIDE
+    inverse = np.zeros(camera.height * camera.width)
+    inverse[cloud.pixel] = 1.0 / ((cloud.points - X_BC.p) @ X_BC.R[:, 2])
+    d = _in_cells(inverse.reshape(camera.height, camera.width), h, w)
+    seen = (d > 0).astype(float)
+    x = (np.arange(w * SIDE) + 0.5 - camera.cx) / camera.fx
+    y = (np.arange(h * SIDE) + 0.5 - camera.cy) / camera.fy
+    grid_x = _in_cells(np.broadcast_to(x, (h * SIDE, w * SIDE)), h, w)
+    grid_y = _in_cells(np.broadcast_to(y[:, None], (h * SIDE, w * SIDE)), h, w)
+    count = seen.sum(axis=-1)
+    some = np.maximum(count, 1)
+    mean = [np.einsum("hwk,hwk->hw", values, seen) / some for values in (grid_x, grid_y, d)]
+    u, v, r = ((values - m[..., None]) * seen for values, m in zip((grid_x, grid_y, d), mean, strict=True))
+    uu, uv, vv, ur, vr, rr = (np.einsum("hwk,hwk->hw", p, q) for p, q in ((u, u), (u, v), (v, v), (u, r), (v, r), (r, r)))
+    determinant = uu * vv - uv**2
+    valid = (count >= FILLED * SIDE * SIDE) & (mean[2] > 0)
+    safe = np.where(valid, determinant, 1.0)
+    b, c = (vv * ur - uv * vr) / safe, (uu * vr - uv * ur) / safe
+    plane = np.stack([b, c, mean[2] - b * mean[0] - c * mean[1]], axis=-1)
+    z = 1.0 / np.where(valid, mean[2], 1.0)
+    left = np.sqrt(np.maximum(rr - b * ur - c * vr, 0.0) / some)  # rms of inverse depth
+    length = np.maximum(np.linalg.norm(plane, axis=-1), 1e-9)
+    # A step in inverse depth moves a point along its ray; the plane's value there changes by z times as much.
+    rough = left * z / length
+    centre = np.stack([mean[0] * z, mean[1] * z, z], axis=-1)
+    return Blocks(valid, centre, np.where(valid[..., None], plane, 0.0), rough)
 
 
 def _in_cells(image: Float[ndarray, "y x"], h: int, w: int) -> Float[ndarray, "h w k"]:
@@ -139,19 +162,31 @@ def spread(image: Float[ndarray, "h w k"], reach: int = 1) -> Float[ndarray, "h 
 
 def _smooth_normals(blocks: Blocks, flat: Bool[ndarray, "h w"]) -> Float[ndarray, "h w 3"]:
     """Normals averaged over neighbours on the same surface, thrice: a patch's own is too noisy to tell sliding from noise."""
-    normal = np.where(flat[..., None], blocks.normal, 0.0)
+    plane = np.where(flat[..., None], blocks.plane, 0.0)
     reach = LEVEL * blocks.centre[..., 2]
     for turn in TURNS:
-        total = normal.copy()
+        normal, total, count = unit(plane), plane.copy(), flat.astype(float)
         for rows, columns in _around(2):
-            other = _shifted(normal, rows, columns)
-            alike = np.einsum("hwi,hwi->hw", normal, other) > np.cos(turn)
+            alike = np.einsum("hwi,hwi->hw", normal, _shifted(normal, rows, columns)) > np.cos(turn)
             offset = _shifted(blocks.centre, rows, columns) - blocks.centre
             alike &= np.abs(np.einsum("hwi,hwi->hw", offset, normal)) < reach
-            total += np.where(alike[..., None], other, 0.0)
-        length = np.linalg.norm(total, axis=-1, keepdims=True)
-        normal = total / np.where(length > 0, length, 1.0)
-    return normal
+            total += np.where(alike[..., None], _shifted(plane, rows, columns), 0.0)
+            count += alike
+        plane = total / np.maximum(count, 1.0)[..., None]  # planes, not unit normals: their noise has mean zero
+    return -unit(plane)
+
+
+def _straight(blocks: Blocks, normal: Float[ndarray, "h w 3"], sigma: Float[ndarray, "h w"]) -> Bool[ndarray, "h w"]:
+    """Where the surface goes on straight to either side: the middle of a groove's wall is flat, but not its surroundings."""
+    straight = np.ones(sigma.shape, bool)
+    for reach in (1, 2):
+        limit = np.maximum(SIGMAS * sigma, BEND * reach**2)
+        for rows, columns in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            ahead, back = ((rows * reach * sign, columns * reach * sign) for sign in (1, -1))
+            middle = (_shifted(blocks.centre, *ahead) + _shifted(blocks.centre, *back)) / 2
+            known = _shifted(blocks.valid, *ahead) & _shifted(blocks.valid, *back)
+            straight &= ~known | (np.abs(np.einsum("hwi,hwi->hw", middle - blocks.centre, normal)) < limit)
+    return straight
 
 
 def _noise(blocks: Blocks, normal: Float[ndarray, "h w 3"], inner: Bool[ndarray, "h w"]) -> Float[ndarray, "h w"]:

@@ -29,7 +29,7 @@ DOF = 7  # of a view: translation, rotation vector, depth offset
 NORMAL_ARM = 0.03  # [m] a difference of normals counts as so much distance when partners are sought
 ALIKE = 0.90  # least cosine between the normals of partners (26 deg)
 ROUNDS = (0.010, 0.004, 0.0015, 0.0007, 0.0007)  # [m] distance at which a pair keeps a quarter of its say, round by round
-SLACK = 1e-4  # [m] surfaces as a camera shows them are wrong by this much beyond their noise
+SLACK = 3e-4  # [m] surfaces as a camera shows them are wrong by this much beyond their noise
 SHARED = 0.25  # what one pair tells: neighbours share their noise
 ENOUGH = 30  # pairs without which a view counts as alone
 MOST = 2500  # patches of a view that take part
@@ -224,7 +224,10 @@ def _registration(
     now = [_distance(views[p.a], views[p.b], p.in_a, p.in_b)[0] for p in pairs]
 
     def rms(distances: list[Float[ndarray, "_"]], which: Sequence[int]) -> float | None:
-        squares, total = sum(float(pairs[k].weight @ distances[k] ** 2) for k in which), sum(float(pairs[k].weight.sum()) for k in which)
+        squares, total = (
+            sum(float(pairs[k].weight @ distances[k] ** 2) for k in which),
+            sum(float(pairs[k].weight.sum()) for k in which),
+        )
         return float(np.sqrt(squares / total)) if total else None
 
     corrections = []

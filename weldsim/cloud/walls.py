@@ -13,9 +13,10 @@ from weldsim.frames import Transform, unit
 from weldsim.records import CameraIntrinsics, PointCloud
 
 REACH = 0.008  # [m] surfaces further apart along the line of sight are different ones
-SIGMAS = 3.0  # a disagreement beyond so many standard deviations is no noise
-LEAST = 3e-4  # [m] disagreements smaller than this are left alone
+SIGMAS = 2.0  # a mean disagreement beyond so many standard deviations of a single point is no noise
+LEAST = 5e-4  # [m] disagreements smaller than this are left alone
 BETTER = 1.15  # times as well seen, to be preferred
+STEP = 0.01  # share of the depth that differs between neighbouring pixels at an edge
 STRIDE = 2  # [px] every so many pixels are compared, each way
 
 
@@ -61,13 +62,27 @@ def _image(cloud: PointCloud) -> _Image:
         raise CloudError("double walls: a view does not know its pixels")
     depth = np.full(camera.height * camera.width, np.nan)
     depth[cloud.pixel] = (cloud.points - X.p) @ X.R[:, 2]
+    depth = _without_edges(depth.reshape(camera.height, camera.width))
     # A square in a groove or on an edge is judged by the surface around it.
-    normal = unit(spread(np.where(blocks.valid[..., None], blocks.normal, 0.0)))
+    normal = unit(spread(blocks.normal))
     distance = np.maximum(np.linalg.norm(blocks.centre, axis=-1), 1e-9)
     facing = np.abs(np.einsum("hwi,hwi->hw", normal, blocks.centre)) / distance
     z = np.maximum(blocks.centre[..., 2], 1e-9)
     rough = blocks.rough[blocks.valid] / np.maximum(facing, 0.1)[blocks.valid] / z[blocks.valid] ** 2
-    return _Image(X, camera, depth.reshape(camera.height, camera.width), blocks, facing / distance, float(np.median(rough)) if rough.size else 0.0)
+    return _Image(X, camera, depth, blocks, facing / distance, float(np.median(rough)) if rough.size else 0.0)
+
+
+def _without_edges(depth: Float[ndarray, "h w"]) -> Float[ndarray, "h w"]:
+    """The image without the pixels beside a step: what lies under them depends on which of the two is met."""
+    edge = np.zeros(depth.shape, bool)
+    with np.errstate(invalid="ignore"):
+        across = np.abs(np.diff(depth, axis=1)) > STEP * depth[:, 1:]
+        down = np.abs(np.diff(depth, axis=0)) > STEP * depth[1:]
+    edge[:, 1:] |= across
+    edge[:, :-1] |= across
+    edge[1:] |= down
+    edge[:-1] |= down
+    return np.where(edge, np.nan, depth)
 
 
 def _worse(image: _Image, other: _Image) -> Bool[ndarray, "bh bw"]:
@@ -99,7 +114,9 @@ def _worse(image: _Image, other: _Image) -> Bool[ndarray, "bh bw"]:
     gap = np.where(close, gap * square, 0.0)
     count = np.bincount(mine[close], minlength=h * w)
     mean = np.bincount(mine[close], weights=gap[close], minlength=h * w) / np.maximum(count, 1)
-    sigma = np.hypot(image.noise * image.blocks.centre[..., 2].ravel() ** 2, other.noise * np.median(depth[close]) ** 2 if close.any() else 0)
+    sigma = np.hypot(
+        image.noise * image.blocks.centre[..., 2].ravel() ** 2, other.noise * np.median(depth[close]) ** 2 if close.any() else 0
+    )
     enough = count >= 0.5 * (SIDE / STRIDE) ** 2
     return (enough & (np.abs(mean) > np.maximum(SIGMAS * sigma, LEAST))).reshape(h, w)
 

@@ -36,8 +36,10 @@ def test_merged_points_know_the_camera_that_saw_them(seed):
         np.testing.assert_array_equal(merged.points[part], cloud.points)
         np.testing.assert_array_equal(merged.sight_origins()[part], cloud.sight_origins())
         assert set(merged.view[part]) == {k}
+        np.testing.assert_array_equal(merged.pixel[part], cloud.pixel)
+        np.testing.assert_array_equal(merged.X_BC.p[k], cloud.X_BC.p)
         start += len(cloud)
-    assert merged.pixel is None
+    assert merge([clouds[0], replace(clouds[1], pixel=None)]).pixel is None
 
 
 def test_one_cloud_is_left_as_it_is():
