@@ -1,9 +1,11 @@
 """A block or plate with a groove over one or three of its faces, seen by several cameras whose poses are not quite true.
 
-Rays are cast against the solid and a table; each view then gets the errors of a real cell: an offset of its depth, a mistaken hand-eye calibration (the same in every camera frame), noise. Nothing of it needs the simulator.
+Rays are cast against the solid and a table; each view then gets the errors of a real cell: an offset of its depth, a
+mistaken hand-eye calibration (the same in every camera frame), noise. Nothing of it needs the simulator.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import manifold3d
@@ -59,8 +61,7 @@ class Block(NamedTuple):
             else [(-x / 2, 0, z), (x / 2, 0, z)]
         )
         lines = [
-            np.linspace(a, b, max(2, int(np.ceil(np.linalg.norm(np.subtract(b, a)) / step)) + 1))
-            for a, b in zip(corners[:-1], corners[1:], strict=True)
+            np.linspace(a, b, max(2, int(np.ceil(np.linalg.norm(np.subtract(b, a)) / step)) + 1)) for a, b in pairwise(corners)
         ]
         return np.concatenate(lines) + CENTRE
 
@@ -185,6 +186,6 @@ def _cast(
 
 def _in_groove(block: Block, hit: Float[ndarray, "h w 3"]) -> Bool[ndarray, "h w"]:
     """Inside the block's outline by more than rounding, between the lips."""
-    p, (x, y, z) = hit - CENTRE, block.size
+    p, (x, _, z) = hit - CENTRE, block.size
     deep = np.minimum(x / 2 - np.abs(p[..., 0]), z - p[..., 2]) > 2e-5
     return deep & (np.abs(p[..., 1]) < block.groove[0] / 2 + 1e-4) & (p[..., 2] > 1e-4) & (np.abs(p[..., 0]) < x / 2)

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from weldsim.cloud.depth_output import write_depth_frame
 from weldsim.cloud.files import write_cloud
+from weldsim.cloud.register import Registration
 from weldsim.config import CellConfig, to_json
 from weldsim.errors import OutputError
 from weldsim.output import write_whole
@@ -47,7 +49,8 @@ def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "Scene
     """The folder, in place of an earlier run's.
 
     It holds config.json (resolved), path.json, path.csv, cloud.ply, a depth image with intrinsics and pose for each view,
-    report.json, report.html, report.png, log.npz where the arm moved, and run.json, which says what is what.
+    views.json where there were several (how they were lined up), report.json, report.html, report.png, log.npz where the arm
+    moved, and run.json, which says what is what.
 
     Raises:
         OutputError: it cannot be written; nothing is left then.
@@ -78,6 +81,8 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     for index, capture in enumerate(result.captures):
         name = "depth" if len(result.captures) == 1 else f"depth_{index}"
         write_depth_frame(folder / f"{name}.png", capture.frame, depth_unit=depth_step(sensor, config))
+    if result.registration is not None:
+        _write_json(folder / "views.json", views_document(result.registration))
     _write_json(folder / "report.json", report_json(report, config.report))
     seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": config.report}
     write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, **seen)
@@ -96,6 +101,11 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
         "files": sorted(path.name for path in folder.iterdir()),
     }
     _write_json(folder / MANIFEST, manifest)
+
+
+def views_document(found: Registration) -> dict[str, Any]:
+    """How views were lined up, as JSON values [m], [rad]."""
+    return {"schema": "weldsim.views/1", "units": {"length": "m", "angle": "rad"}, **asdict(found)}
 
 
 def log_bytes(log: ExecutionLog) -> bytes:

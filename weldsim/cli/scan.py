@@ -1,6 +1,6 @@
 """`weldsim scan`."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,26 +50,24 @@ class Scan(ConfigOptions):
             raise InputError(f"--view {self.view}: scene {scene.name!r} has {views}, counted from 1", view=self.view)
         choose_platform()
 
-        from weldsim.cloud.deproject import deproject
-        from weldsim.cloud.merge import merge
-        from weldsim.pipeline import scan
-        from weldsim.scene.world import build_world
+        from weldsim.cloud.register import lines
+        from weldsim.pipeline import Clock, look
 
         with progress() as tell:
-            tell("scene", None)
-            world = build_world(scene)
-            tell("scan", None)
-            captures = scan(world, config, self.seed, self.sensor)
-        cloud = merge([deproject(capture.frame) for capture in captures])
+            seen = look(scene, config, seed=self.seed, sensor=self.sensor, clock=Clock(tell))
+        captures, cloud, found = seen.captures, seen.cloud, seen.registration
         self._write(cloud, captures[self.view - 1].frame, depth_step(self.sensor, config))
         written = [str(path) for path in (self.out, *files) if path is not None]
         if self.json:
-            seen = {"scene": scene.name, "seed": self.seed, "sensor": self.sensor, "views": len(captures), "points": len(cloud)}
-            print_json({**seen, "viewpoints": cloud.viewpoints.tolist(), "written": written})
+            what = {"scene": scene.name, "seed": self.seed, "sensor": self.sensor, "views": len(captures), "points": len(cloud)}
+            lined_up = None if found is None else asdict(found)
+            print_json({**what, "viewpoints": cloud.viewpoints.tolist(), "lined_up": lined_up, "written": written})
             return 0
         print(f"{scene.name}, seed {self.seed}, {captures[0].frame.source}: {len(cloud)} points from {len(captures)} view(s)")
         for i, (x, y, z) in enumerate(cloud.viewpoints, start=1):
             print(f"  view {i} from ({x:.4f}, {y:.4f}, {z:.4f}) m in the base")
+        for line in lines(found):
+            print(f"  {line}")
         for name in written:
             print(f"  wrote {name}")
         return 0

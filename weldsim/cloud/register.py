@@ -72,6 +72,23 @@ class Registration:
     alone: tuple[int, ...] = ()
 
 
+def lines(found: Registration | None) -> tuple[str, ...]:
+    """For people: what was corrected, in millimetres; nothing for a single view."""
+    if found is None:
+        return ()
+    if found.before is None or found.after is None:
+        return ("views share no surface and are left as they are",)
+    out = [
+        f"views lined up: surfaces that two of them show {1e3 * found.before:.2f} mm apart, then {1e3 * found.after:.2f} mm (rms)"
+    ]
+    for i, view in enumerate(found.views, start=1):
+        shift = 1e3 * float(np.linalg.norm(view.shift_C))
+        what = f"view {i}: depth {1e3 * view.depth:+.2f} mm, camera {shift:.2f} mm and {np.degrees(view.turn):.2f} deg"
+        out.append(what + ("; shares too little with any other" if i - 1 in found.alone else ""))
+    x, y, z = (1e3 * sigma for sigma in found.unseen)
+    return (*out, f"where all of it lies no view can tell: {x:.1f}, {y:.1f}, {z:.1f} mm (standard deviation along x, y, z)")
+
+
 @dataclass(frozen=True, eq=False)
 class _View:
     """One view at some correction x. Attributes: X, its pose X_BC; centres, normals, (n, 3) of its patches in B; seen, (n, 3)
@@ -171,7 +188,7 @@ def _partners(patches: list[Patches], views: list[_View], reach: float) -> list[
             if tree is None or not len(features[here]):
                 continue
             gap = float(patches[here].spacing.max())
-            _, index = tree.query(features[here], distance_upper_bound=reach + gap)
+            index = np.asarray(tree.query(features[here], distance_upper_bound=reach + gap)[1])
             rows = np.flatnonzero(index < len(features[there]))
             seen.append(np.column_stack([rows, index[rows]])[:, :: 1 if here == a else -1])
         i, j = (np.unique(np.concatenate(seen), axis=0) if seen else np.zeros((0, 2), np.int64)).T

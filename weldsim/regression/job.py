@@ -114,7 +114,7 @@ def _planned(task: Task, method: str, seen: Sighting) -> Row:
         result,
         seen.world.known_seams,
         config,
-        true_region=true_region(seen.captures, seen.cloud, result.cloud),
+        true_region=true_region(seen.captures, result.cloud),
         report=done.report,
     )
     figures = replace(figures, refused=refused or "; ".join(map(str, result.refused.values())))
