@@ -28,11 +28,15 @@ class RegisterConfig:
     hand_eye_turn: Radian = 0.0035
     """Standard deviation of the hand-eye calibration about each axis (0.2 deg)."""
 
+    farthest: Metre = 1.2
+    """Where views are merged, points deeper than this are dropped: they are of the room, and a stereo camera's noise is ten
+    times that of its working distance."""
+
     double_walls: bool = True
     """Whether, where two views still show one surface in two places, the worse-seen one is dropped."""
 
     def __post_init__(self) -> None:
-        for name in ("offset_sigma", "view_sigma", "view_turn", "hand_eye_sigma", "hand_eye_turn"):
+        for name in ("offset_sigma", "view_sigma", "view_turn", "hand_eye_sigma", "hand_eye_turn", "farthest"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"cloud.register.{name} = {getattr(self, name):g}: must be positive", key=name)
 

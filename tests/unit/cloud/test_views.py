@@ -43,7 +43,7 @@ def test_the_worse_seen_of_two_walls_is_dropped(step, seed):
 
 def test_merged_points_know_view_and_pixel():
     seen = scan(np.random.default_rng(1), PLATE, fan(PLATE, (-30.0, 0.0, 30.0)), noise="d415", offset=0.0035, intrinsics=NARROW)
-    merged, found = merge_views(seen.clouds)
+    merged, found = merge_views(seen.clouds, RegisterConfig(farthest=9.0))
     assert found is not None
     assert len(merged) + sum(dropped(seen.clouds, merged)) == sum(map(len, seen.clouds))
     labels = np.zeros((3, NARROW.width * NARROW.height), bool)
@@ -72,6 +72,13 @@ def test_one_view_is_left_untouched():
 
 def test_what_is_switched_off_is_not_done():
     seen = scan(np.random.default_rng(3), Block(), fan(Block(), FAN[:3]), noise="d415", offset=0.0035, intrinsics=NARROW)
-    merged, found = merge_views(seen.clouds, RegisterConfig(enabled=False, double_walls=False))
+    merged, found = merge_views(seen.clouds, RegisterConfig(enabled=False, double_walls=False, farthest=9.0))
     assert found is None
     np.testing.assert_array_equal(merged.points, merge(seen.clouds).points)
+
+
+def test_what_is_far_away_is_dropped_from_several_views():
+    seen = scan(np.random.default_rng(4), PLATE, fan(PLATE, (-60.0, 60.0)), intrinsics=NARROW)
+    merged, _ = merge_views(seen.clouds, RegisterConfig(farthest=0.6))
+    depth = np.einsum("ij,ij->i", merged.points - merged.sight_origins(), merged.X_BC.R[merged.view][:, :, 2])
+    assert 0.59 < depth.max() < 0.61
