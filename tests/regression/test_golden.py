@@ -62,7 +62,7 @@ def test_a_seam_more_or_less_is_never_tolerated():
 
 
 def test_a_figure_that_can_no_longer_be_measured_fails_and_one_that_never_could_does_not():
-    lost = Figures(scene="made", method="profile", seed=0, known=1, missed=1, coverage=0.0)
+    lost = Figures(scene="made", method="profile", seed=0, known=1, missed=1, coverage=0.0, seconds=0.1)
     figures = {deviation.figure for deviation in compare(lost, GOLDEN.entries("made", "profile"))}
     assert {"missed", "mean", "p95", "max", "coverage"} <= figures
     nothing = updated(Golden(), [lost], "it never worked").entries("made", "profile")
@@ -88,6 +88,13 @@ def test_an_update_keeps_tolerances_and_the_reasons_of_what_did_not_change():
     assert again["seconds"] == entries["seconds"]
     other = updated(tight, [replace(GOOD, scene="other")], "new")
     assert set(other.scenes) == {"made", "other"}
+
+
+def test_a_scene_that_could_not_be_scanned_is_not_recorded():
+    unseen = Figures(
+        scene="made", method="profile", seed=0, known=1, missed=1, coverage=0.0, refused="scan view 0: no joint solution"
+    )
+    assert updated(GOLDEN, [unseen], "why").scenes == GOLDEN.scenes
 
 
 def test_an_update_needs_a_reason_and_seeds_from_0():

@@ -149,6 +149,8 @@ def compare(figures: Figures, entries: Entries) -> tuple[Deviation, ...]:
 def updated(golden: Golden, rows: Iterable[Figures], reason: str) -> Golden:
     """The golden figures with those of `rows` in their place: tolerances are kept, and reasons too where nothing changed.
 
+    A scene that could not be scanned stays as it was: that nothing was seen is not accepted as a figure.
+
     Args:
         golden: as it was.  rows: the new figures, of seeds 0 to n - 1 for each scene and method.  reason: why they change.
     Raises:
@@ -165,6 +167,8 @@ def updated(golden: Golden, rows: Iterable[Figures], reason: str) -> Golden:
         if [row.seed for row in members] != list(range(len(members))):
             raise InputError(f"{scene}, {method}: golden figures need seeds 0 to n - 1", seeds=[row.seed for row in members])
         before = golden.entries(scene, method)
+        if any(row.seconds is None for row in members):
+            continue
         judged = [row.judged() for row in members]
         names = [name for name in FIGURES if any(name in figures for figures in judged)]
         new = {name: _renewed(name, method, [figures.get(name) for figures in judged], before.get(name), reason) for name in names}

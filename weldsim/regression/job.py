@@ -15,9 +15,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from weldsim.config import CellConfig, digest, to_json
-from weldsim.errors import MotionError, WeldsimError
+from weldsim.errors import InputError, MotionError, WeldsimError
 from weldsim.output import write_whole
-from weldsim.pipeline import Clock, Finder, PlanResult, RunResult, Sighting, finish, look, plan, true_region
+from weldsim.pipeline import Clock, Finder, PlanResult, RunResult, SensorName, Sighting, finish, look, plan, true_region
 from weldsim.records import Rejection, SeamFindings
 from weldsim.regression.figures import Figures, figures_of
 from weldsim.regression.golden import Deviation, Entries, compare
@@ -40,6 +40,7 @@ class Task:
         finders: {name of a method: the caller's own finder}.  execute: whether the arm welds too.
         golden: {method: entries} to judge by; empty for a method that has none.
         keep: folder for the run directories of what fails; None = none are written.
+        sensor: what looks.
         pictures: whether a picture of each method is wanted.
     """
 
@@ -50,6 +51,7 @@ class Task:
     execute: bool = False
     golden: Mapping[str, Entries] = field(default_factory=dict)
     keep: Path | None = None
+    sensor: SensorName = "d415"
     pictures: bool = False
 
 
@@ -83,8 +85,10 @@ def carry_out(task: Task) -> tuple[Row, ...]:
             clock = Clock()
             config = next(iter(task.methods.values()))
             world = _built(task.scene, config.twin)
-            seen = look(task.scene, config, seed=task.seed, world=world, clock=clock)
-        except MotionError as error:  # a view out of reach: there is no cloud
+            seen = look(task.scene, config, seed=task.seed, sensor=task.sensor, world=world, clock=clock)
+        except InputError:  # a scene that contradicts itself: nothing to be judged
+            raise
+        except WeldsimError as error:  # a view out of reach, a camera that sees nothing: there is no cloud
             return tuple(_unseen(task, method, error) for method in task.methods)
         seconds = sum(seen.timing.values())
         return tuple(replace(_planned(task, method, seen), scan_seconds=seconds) for method in task.methods)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 from weldsim.config import CellConfig, load_toml, structure
 from weldsim.errors import ExecutionError, InputError
-from weldsim.pipeline import Finder
+from weldsim.pipeline import Finder, SensorName
 from weldsim.regression.golden import Deviation, Golden
 from weldsim.regression.job import Row, Task, carry_out
 from weldsim.scene.files import scene_names, scene_path
@@ -68,6 +68,7 @@ def regress(
     seeds: int = 3,
     jobs: int = 1,
     config: CellConfig | None = None,
+    sensor: SensorName = "d415",
     execute: bool = False,
     golden: Golden | None = None,
     keep: Path | None = None,
@@ -82,7 +83,7 @@ def regress(
         seeds: of the camera's noise, 0 to seeds - 1; each scene and seed is scanned once for all methods.
         jobs: processes, each with one core; 1 = this process.
         config: settings; its method is replaced by each of `methods`.
-        execute: whether the simulated arm welds what was planned.
+        sensor: what looks.  execute: whether the simulated arm welds what was planned.
         golden: figures to judge by; what it lacks is not judged.
         keep: folder in which what fails leaves its run directory.
         pictures: whether rows of seed 0 carry a picture.
@@ -106,6 +107,7 @@ def regress(
             execute=execute,
             golden={} if golden is None else {method: golden.entries(scene.name, method) for method in settings},
             keep=keep,
+            sensor=sensor,
             pictures=pictures and seed == 0,
         )
         for scene in chosen
