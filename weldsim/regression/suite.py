@@ -3,9 +3,10 @@
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -81,7 +82,7 @@ def regress(
         scenes: names, TOML files or configs; None = all that come with weldsim.
         methods: seam finders of weldsim's.  finders: {name: the caller's own}, judged besides.
         seeds: of the camera's noise, 0 to seeds - 1; each scene and seed is scanned once for all methods.
-        jobs: processes, each with one core; 1 = this process.
+        jobs: processes, each with one core (threads of native libraries are held to one); 1 = this process.
         config: settings; its method is replaced by each of `methods`.
         sensor: what looks.  execute: whether the simulated arm welds what was planned.
         golden: figures to judge by; what it lacks is not judged.
@@ -113,7 +114,8 @@ def regress(
         for scene in chosen
         for seed in range(seeds)
     ]
-    done = _in_this_process(tasks, tell) if jobs == 1 else _in_processes(tasks, min(jobs, len(tasks)), tell)
+    with _one_thread():
+        done = _in_this_process(tasks, tell) if jobs == 1 else _in_processes(tasks, min(jobs, len(tasks)), tell)
     rows = [row for rows in done for row in rows]
     order = {(scene.name, method): k for k, (scene, method) in enumerate((s, m) for s in chosen for m in settings)}
     rows.sort(key=lambda row: (order[row.figures.scene, row.figures.method], row.figures.seed))
@@ -166,8 +168,6 @@ def _in_processes(tasks: list[Task], jobs: int, tell: Tell) -> list[tuple[Row, .
     """Spawned, not forked: OpenGL contexts and thread pools do not survive a fork. Long tasks go first."""
     out: list[tuple[Row, ...]] = [()] * len(tasks)
     longest = sorted(range(len(tasks)), key=lambda k: -len(tasks[k].scene.views))
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
         with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
             waiting = {pool.submit(carry_out, tasks[k]): k for k in longest}
@@ -181,7 +181,16 @@ def _in_processes(tasks: list[Task], jobs: int, tell: Tell) -> list[tuple[Row, .
                 raise
     except BrokenProcessPool:
         raise ExecutionError("a worker process died (out of memory?); use fewer jobs", rule="jobs", value=jobs) from None
+    return out
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Native libraries that are loaded, or processes that are started, within the block take one thread."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
     finally:
         for name, value in before.items():
             os.environ.pop(name) if value is None else os.environ.update({name: value})
-    return out

@@ -1,5 +1,6 @@
 """CellGrid: points sorted into cubic cells, so that all neighbours within a radius lie in a few contiguous runs."""
 
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -12,6 +13,13 @@ from numpy import ndarray
 MAX_CELLS = 1 << 22  # cells grow beyond half the radius rather than fill memory when a cloud is wide
 THREADS = 2
 BLOCKS = 16  # pieces of work: enough for threads to finish together
+FEW = 4096  # points: threads take longer to start than these take
+
+
+def threads() -> int:
+    """How many threads share the work: as many as native libraries are allowed (OMP_NUM_THREADS), `THREADS` at most."""
+    allowed = os.environ.get("OMP_NUM_THREADS", "")
+    return min(THREADS, int(allowed)) if allowed.isdecimal() and int(allowed) > 0 else THREADS
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +60,14 @@ class CellGrid:
     def run(self, kernel: Callable[..., None], *arrays: Any) -> None:
         """Call `kernel(first, last, *grid, *arrays)` over all points in blocks, on threads (kernels release the GIL).
         `arrays` are in cell order and outputs are written in place, so the result does not depend on the threads."""
-        n = len(self.points)
+        n, workers = len(self.points), threads()
         grid = (self.points, self.start, self.shape, self.origin, 1.0 / self.cell, self.reach, self.radius**2)
+        if n <= FEW or workers == 1:
+            kernel(0, n, *grid, *arrays)
+            return
         edges = np.linspace(0, n, BLOCKS + 1).astype(np.int64)
         kernel(0, 0, *grid, *arrays)  # compiled once, before the threads race to do it
-        with ThreadPoolExecutor(THREADS) as pool:
+        with ThreadPoolExecutor(workers) as pool:
             list(pool.map(lambda i: kernel(edges[i], edges[i + 1], *grid, *arrays), range(BLOCKS)))
 
     def unsort(self, values: Float[ndarray, "n *rest"]) -> Float[ndarray, "n *rest"]:

@@ -1,0 +1,76 @@
+"""The numbered experiments: what they recompute from printed tables, and that they run."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import cv2
+import numpy as np
+import pytest
+
+EXPERIMENTS = Path(__file__).parents[2] / "experiments"
+
+
+def script(name: str) -> ModuleType:
+    """A numbered script as a module."""
+    spec = importlib.util.spec_from_file_location(name[3:], EXPERIMENTS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_errors_of_the_thesis_are_recomputed_from_its_pairs(real_data):
+    tables = json.loads((real_data.parent / "thesis_tables.json").read_text())
+    module = script("10_thesis_tables")
+    assert module.guidance(tables)["recomputed"] == pytest.approx(32.8e-3, abs=0.05e-3)
+    first, second = module.depth(tables, seeds=1)
+    assert first["recomputed"] == pytest.approx(3.5e-3, abs=0.05e-3)
+    assert first["ours"] < 1e-3 < second["ours"]
+    for name, pair, across, seconds in (("cylinder", 5.0, 3.0, 40.15), ("cuboid", 6.1, 4.4, 61.11), ("y", 6.4, 3.9, 25.65)):
+        time, distance, cross, _ = module.part(name, tables, None)
+        assert time["recomputed"] == pytest.approx(seconds, abs=0.1)
+        assert distance["recomputed"] == pytest.approx(pair * 1e-3, abs=0.06e-3)
+        assert cross["recomputed"] == pytest.approx(across * 1e-3, abs=0.35e-3)
+    assert "| 6.1 |" in module.markdown([module.guidance(tables), first], 1)
+
+
+@pytest.mark.render
+def test_sensitivity_is_measured_and_drawn(tmp_path):
+    command = [
+        sys.executable,
+        str(EXPERIMENTS / "11_sensitivity.py"),
+        "--quick",
+        "--only",
+        "width",
+        "--jobs",
+        "1",
+        "--out",
+        str(tmp_path),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((tmp_path / "11_sensitivity.json").read_text())["sweeps"]["width"]
+    assert len(rows) == 4
+    ours = [row for row in rows if row["method"] == "profile" and row["value"] > 0.01]
+    assert all(row["mean"] < 0.6e-3 for row in ours)
+    assert cv2.imread(str(tmp_path / "11_sensitivity.png")).std() > 5
+
+
+def test_the_budget_is_a_table_of_every_source():
+    module = script("12_error_budget")
+    names = [*module.sources(0)]
+    rows = [
+        {"source": name, "scene": "straight", "unit": unit, "planned": 1e-4 * k, "executed": None, "tracking": 5e-5}
+        for unit in range(2)
+        for k, name in enumerate(names)
+    ]
+    lines = module.markdown(rows, ["straight"], 2).splitlines()
+    assert lines[-1] == "| straight | " + " | ".join(f"{0.1 * k:.2f} / -" for k in range(len(names))) + " | 0.05 |"
+    one, other = (module.sources(unit)["hand-eye"][1].twin for unit in (0, 1))
+    assert not np.allclose(one.X_FC.p, other.X_FC.p)
