@@ -122,7 +122,10 @@ def _add_lights(spec: Spec) -> None:
 def _add_table(spec: Spec) -> None:
     """A welding table, its top at B's z = 0, and the floor."""
     world = spec.worldbody
-    floor = world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[4.0, 4.0, 0.1], contype=1, conaffinity=1)
+    # A view from the side sees all of it, and a cloud that spans 5 m would pass for millimetres.
+    floor = world.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[0.0, 0.32, 0.0], size=[2.2, 2.2, 0.1], contype=1, conaffinity=1
+    )
     floor.material = "floor"
     middle, half = np.array([0.0, 0.32, TABLE_TOP - 0.02]), np.array([0.60, 0.52, 0.02])
     box(world, "table", middle, half, "table_top", collide=True)
