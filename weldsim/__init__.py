@@ -19,6 +19,7 @@ _PUBLIC = {
     "WeldReport": "weldsim.records",
     "CellConfig": "weldsim.config",
     "load_config": "weldsim.config",
+    "load_scene": "weldsim.config",
     "read_cloud": "weldsim.cloud.files",
     "plan": "weldsim.pipeline",
     "run": "weldsim.pipeline",
@@ -35,6 +36,7 @@ __all__ = [
     "WeldsimError",
     "__version__",
     "load_config",
+    "load_scene",
     "plan",
     "read_cloud",
     "run",
@@ -42,7 +44,7 @@ __all__ = [
 
 if TYPE_CHECKING:
     from weldsim.cloud.files import read_cloud
-    from weldsim.config import CellConfig, load_config
+    from weldsim.config import CellConfig, load_config, load_scene
     from weldsim.errors import WeldsimError
     from weldsim.frames import Transform
     from weldsim.pipeline import plan, run

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from weldsim.cloud.config import CloudConfig
 from weldsim.errors import ConfigError
@@ -26,7 +26,10 @@ from weldsim.sensor.d415 import D415Config
 from weldsim.sensor.kinect import KinectConfig
 from weldsim.sensor.stereo_config import D415StereoConfig
 
-__all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config", "load_toml", "structure", "to_json"]
+if TYPE_CHECKING:
+    from weldsim.scene.config import SceneConfig
+
+__all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config", "load_scene", "load_toml", "structure", "to_json"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +82,20 @@ def load_toml(path: str | Path) -> dict[str, Any]:
     except (UnicodeDecodeError, ValueError, RecursionError) as error:
         reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
         raise ConfigError(f"{path}: no TOML: {reason}", path=str(path)) from None
+
+
+def load_scene(name: str | Path, overrides: Iterable[str] = ()) -> "SceneConfig":
+    """The scene of that name, or of a TOML file, with `key=value` overrides; paths in it start where its file is.
+
+    Raises:
+        SceneError: an unknown name, or no such file.  ConfigError: a file that is no scene.
+    """
+    from weldsim.scene.config import SceneConfig  # a plan never needs it
+    from weldsim.scene.files import anchored, scene_path
+
+    path = scene_path(name)
+    tables = anchored(apply_overrides(load_toml(path), overrides), path.parent)
+    return structure({"name": path.stem, **tables}, SceneConfig, where=str(name))
 
 
 def load_config(path: str | Path | None = None, overrides: Iterable[str] = ()) -> CellConfig:

@@ -84,6 +84,12 @@ def test_scenes_are_listed_from_the_wheel(clean):
         assert file.stem == "cell" or file.stem in listed
 
 
+def test_a_scene_is_exported_from_the_wheel_and_stock_mujoco_loads_it(clean):
+    run(clean, "weldsim", "scenes", "export", "straight", "-o", "cell.xml")
+    load = "import mujoco; print(mujoco.MjModel.from_xml_path('cell.xml').ngeom)"
+    assert int(run(clean, "python", "-c", load)) > 100
+
+
 def test_a_cloud_is_planned_from_the_wheel(clean):
     np.savez(clean / "cloud.npz", points=groove_cloud())
     run(clean, "weldsim", "plan", "cloud.npz", "--viewpoint", "0", "-0.45", "0.5", "--out", "path.json")

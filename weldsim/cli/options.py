@@ -3,11 +3,11 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from weldsim.config import CellConfig, apply_overrides, load_config, load_toml, structure
+from weldsim.config import CellConfig, load_config, load_scene
 from weldsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,13 +39,7 @@ class ConfigOptions:
 
     def scene_of(self, name: str) -> "SceneConfig":
         """The scene of that name or file, with every --set that starts with `scene.`. Raises SceneError, ConfigError."""
-        from weldsim.scene.config import SceneConfig
-        from weldsim.scene.files import scene_path
-
-        path = scene_path(name)
-        settings = [text.removeprefix(SCENE_PREFIX) for text in self.set if text.startswith(SCENE_PREFIX)]
-        tables: dict[str, Any] = apply_overrides(load_toml(path), settings)
-        return structure({"name": path.stem, **tables}, SceneConfig, where=str(name))
+        return load_scene(name, [text.removeprefix(SCENE_PREFIX) for text in self.set if text.startswith(SCENE_PREFIX)])
 
 
 def refuse_together(**given: object) -> None:

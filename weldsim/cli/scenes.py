@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -11,23 +11,27 @@ from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
 
+if TYPE_CHECKING:
+    from weldsim.scene.config import SceneConfig
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scenes(ConfigOptions):
-    """List the scenes that come with weldsim, or draw one: `weldsim scenes show curve -o curve.png`."""
+    """List the scenes that come with weldsim, draw one, `weldsim scenes show curve`, or export one as plain MJCF."""
 
-    action: tyro.conf.Positional[Literal["list", "show"]] = "list"
-    """List all, or draw one."""
+    action: tyro.conf.Positional[Literal["list", "show", "export"]] = "list"
+    """List all, draw one, or export one."""
 
     scene: SceneName = ""
-    """With show: name of a scene, or a TOML file."""
+    """With show and export: name of a scene, or a TOML file."""
 
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """With show: where to write the picture, PNG: the cell, and what the camera sees from its first view."""
+    """Where to write. With show a PNG, SCENE.png by default: the cell and what every camera sees. With export an XML, SCENE.xml
+    by default, which MuJoCo's own viewer opens; its meshes come in a folder beside it."""
 
     def __call__(self) -> int:
         """0."""
-        return self._list() if self.action == "list" else self._show()
+        return {"list": self._list, "show": self._show, "export": self._export}[self.action]()
 
     def _list(self) -> int:
         from weldsim.scene.files import scene_names
@@ -42,11 +46,7 @@ class Scenes(ConfigOptions):
         return 0
 
     def _show(self) -> int:
-        if not self.scene or self.out is None:
-            raise InputError("scenes show: give a scene and --out FILE.png")
-        check_suffix(self.out, (".png",), "a picture")
-        check_outputs((self.out,), (self.config,))
-        scene = self.scene_of(self.scene)
+        scene, out = self._chosen(".png", "a picture")
         choose_platform()
 
         from weldsim.output import write_whole
@@ -55,9 +55,33 @@ class Scenes(ConfigOptions):
         with progress() as tell:
             tell("drawing", None)
             picture = portrait(scene)
-        write_whole(self.out, picture)
+        write_whole(out, picture)
+        return self._wrote(scene, out)
+
+    def _export(self) -> int:
+        scene, out = self._chosen(".xml", "an MJCF scene")
+
+        from weldsim.scene.export import write_plain_scene
+
+        with progress() as tell:
+            tell("exporting", None)
+            written = write_plain_scene(out, scene)
+        return self._wrote(scene, *written)
+
+    def _chosen(self, suffix: str, what: str) -> "tuple[SceneConfig, Path]":
+        """The scene that is meant, and where to write. Raises InputError, SceneError, OutputError."""
+        if not self.scene:
+            raise InputError(f"scenes {self.action}: give a scene")
+        scene = self.scene_of(self.scene)
+        out = self.out or Path(f"{Path(self.scene).stem}{suffix}")
+        check_suffix(out, (suffix,), what)
+        check_outputs((out,), (self.config, Path(self.scene)))
+        return scene, out
+
+    def _wrote(self, scene: "SceneConfig", *written: Path) -> int:
         if self.json:
-            print_json({"scene": scene.name, "written": [str(self.out)]})
+            print_json({"scene": scene.name, "written": [str(path) for path in written]})
         else:
-            print(f"  wrote {self.out}")
+            for path in written:
+                print(f"  wrote {path}")
         return 0

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from weldsim.config import CellConfig, load_toml, structure
+from weldsim.config import CellConfig, load_scene
 from weldsim.errors import ExecutionError, InputError
 from weldsim.pipeline import Finder, SensorName
 from weldsim.regression.golden import Deviation, Golden
 from weldsim.regression.job import Row, Task, carry_out
-from weldsim.scene.files import scene_names, scene_path
+from weldsim.scene.files import scene_names
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
@@ -135,8 +135,7 @@ def _scenes(scenes: "Sequence[str | Path | SceneConfig] | None") -> "list[SceneC
     chosen = []
     for scene in scene_names() if scenes is None else scenes:
         if not isinstance(scene, SceneConfig):
-            path = scene_path(scene)
-            scene = structure({"name": path.stem, **load_toml(path)}, SceneConfig, where=str(scene))
+            scene = load_scene(scene)
         if scene.name in [other.name for other in chosen]:
             raise InputError(f"scene {scene.name!r} is given twice", scene=scene.name)
         if not scene.name or any(mark in scene.name for mark in ("/", "\\", "\0")) or scene.name.startswith("."):

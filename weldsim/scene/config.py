@@ -16,6 +16,7 @@ from weldsim.scene.workpieces.cuboid import CuboidConfig, make_cuboid
 from weldsim.scene.workpieces.cylinder import CylinderConfig, make_cylinder
 from weldsim.scene.workpieces.groove import GrooveConfig
 from weldsim.scene.workpieces.plate import PlainPlate, PlateConfig, make_groove_plate
+from weldsim.scene.workpieces.user_mesh import MeshConfig, make_user_mesh
 
 __all__ = [
     "CameraPoseConfig",
@@ -29,7 +30,7 @@ __all__ = [
 ]
 
 Finish = Literal["matte", "mill_scale", "ground", "black"]
-WorkpieceKind = Literal["groove_plate", "plain_plate", "cylinder", "cuboid", "y"]
+WorkpieceKind = Literal["groove_plate", "plain_plate", "cylinder", "cuboid", "y", "mesh"]
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class FixtureConfig:
 
     Attributes:
         stand: whether a part that is held above the table has legs under it, or hangs in the air.
-        clamps: step clamps on the part's long sides: 0, 2 or 4.
+        clamps: step clamps on the part's long sides: 0, 2 or 4; one's own part has none.
         overlap: of each clamp's nose over the part [m].
         bolts: bolt heads standing on the part's level surface, as clutter: 0 to 6.
     """
@@ -100,6 +101,7 @@ class SceneConfig:
         plate: dimensions of a plate, grooved, plain or with a Y.
         cylinder: dimensions of a cylinder.
         cuboid: dimensions of a cuboid.
+        mesh: files of one's own part.
         groove: its groove's cross-section.
         centre_line: where the groove of a groove plate runs.
         branches: where those of a Y run.
@@ -115,6 +117,7 @@ class SceneConfig:
     plate: PlateConfig = field(default_factory=PlateConfig)
     cylinder: CylinderConfig = field(default_factory=CylinderConfig)
     cuboid: CuboidConfig = field(default_factory=CuboidConfig)
+    mesh: MeshConfig | None = None
     groove: GrooveConfig = field(default_factory=GrooveConfig)
     centre_line: CentreLineConfig = field(default_factory=CentreLineConfig)
     branches: BranchesConfig = field(default_factory=BranchesConfig)
@@ -128,8 +131,10 @@ def make_workpiece(config: SceneConfig) -> Workpiece:
     """The part that `config` describes.
 
     Raises:
-        SceneError: dimensions that contradict each other.
+        SceneError: dimensions that contradict each other, or a file that cannot be used.
     """
+    if config.mesh is not None and config.workpiece != "mesh":
+        raise SceneError(f'[mesh] is given, but workpiece = "{config.workpiece}"; write workpiece = "mesh"', key="workpiece")
     match config.workpiece:
         case "plain_plate":
             return PlainPlate(config.plate.checked())
@@ -141,6 +146,10 @@ def make_workpiece(config: SceneConfig) -> Workpiece:
             return make_cuboid(config.cuboid, config.groove)
         case "y":
             return make_branched_plate(config.plate, config.groove, config.branches)
+        case "mesh":
+            if config.mesh is None:
+                raise SceneError('workpiece = "mesh": give a table [mesh] with file and units', key="mesh")
+            return make_user_mesh(config.mesh)
 
 
 def part_pose(config: PartPoseConfig, workpiece: Workpiece) -> Transform:

@@ -1,6 +1,8 @@
 """Where scenes and assets lie: at the top of a checkout, or inside the installed package."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from weldsim.errors import SceneError
 
@@ -41,6 +43,15 @@ def scene_path(name: str | Path) -> Path:
         scene=str(name),
         allowed=scene_names(),
     )
+
+
+def anchored(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The tables of a scene file with the names of other files in them made to start at `folder`, where the scene's file is."""
+    tables = dict(tables)
+    if isinstance(mesh := tables.get("mesh"), dict):
+        named = {key: str(folder / value) for key, value in mesh.items() if key in ("file", "seam") and isinstance(value, str)}
+        tables["mesh"] = {**mesh, **named}
+    return tables
 
 
 def asset_path(*parts: str) -> Path:

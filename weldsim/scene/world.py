@@ -138,11 +138,7 @@ def build_world(
     keep_quiet()
     workpiece = make_workpiece(config)
     X_BP = part_pose(config.pose, workpiece)
-    spec = new_cell(config.material)
-    _misplace_joints(spec, twin)
-    add_tool(spec.body("wrist_3_link"), intrinsics)
-    _add_part(spec, config, workpiece, X_BP)
-    model = spec.compile()
+    model = compose(config, workpiece, X_BP, intrinsics, twin).compile()
     joints = [model.joint(name) for name in JOINT_NAMES]
     return World(
         config=config,
@@ -159,6 +155,25 @@ def build_world(
         dof=np.array([joint.dofadr[0] for joint in joints]),
         actuators=np.array([model.actuator(name).id for name in JOINT_NAMES]),
     )
+
+
+def compose(
+    config: SceneConfig,
+    workpiece: Workpiece,
+    X_BP: Transform,
+    intrinsics: CameraIntrinsics = D415_640X480,
+    twin: TwinConfig = TwinConfig(),  # noqa: B008 - frozen
+) -> Any:
+    """The scene as a MuJoCo specification, not compiled: room, arm, tool, and the part at X_BP with what holds it.
+
+    Raises:
+        SceneError: a fixture that does not fit the part.
+    """
+    spec = new_cell(config.material)
+    _misplace_joints(spec, twin)
+    add_tool(spec.body("wrist_3_link"), intrinsics)
+    _add_part(spec, config, workpiece, X_BP)
+    return spec
 
 
 def _misplace_joints(spec: Any, twin: TwinConfig) -> None:

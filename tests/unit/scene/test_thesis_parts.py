@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.meshes import distance_to_faces, ray_lengths
 from weldsim.config import load_toml, structure
 from weldsim.curves import project
 from weldsim.errors import SceneError
@@ -22,6 +21,7 @@ from weldsim.scene.workpieces.cuboid import CuboidConfig, make_cuboid
 from weldsim.scene.workpieces.cylinder import CylinderConfig, make_cylinder
 from weldsim.scene.workpieces.groove import GrooveConfig
 from weldsim.scene.workpieces.plate import PlateConfig, make_groove_plate
+from weldsim.scene.workpieces.triangles import distance_to_faces, ray_lengths
 from weldsim.scene.world import build_world
 
 MM = 1e-3

@@ -200,6 +200,12 @@ def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: Cen
             key="depth",
             limit=plate.thickness,
         )
+    if section.width >= plate.length:
+        raise SceneError(
+            f"groove: width {section.width * 1e3:g} mm is wider than the plate is long, {plate.length * 1e3:g} mm",
+            key="width",
+            limit=plate.length,
+        )
     if 2 * groove.margin >= plate.length - section.width:
         raise SceneError(
             f"groove: margins of {groove.margin * 1e3:g} mm leave no groove on a plate {plate.length * 1e3:g} mm long;"
