@@ -5,25 +5,23 @@ Coarse: valleys of the cloud's chart (`chart`, `valley`). Fine: each candidate i
 background, the smoothing from cross-validation, the blur of the camera's support window from the groove's own shape.
 """
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from weldsim.curves import arc_length, interpolate, project, tangents
 from weldsim.frames import unit
-from weldsim.records import PointCloud, Rejection, Seam, SeamFindings, Threshold
+from weldsim.records import PointCloud, Rejection, Seam, SeamFindings
 from weldsim.seam.config import ProfileConfig
-from weldsim.seam.profile.chart import Chart, make_chart
+from weldsim.seam.profile.atlas import SURROUNDINGS, Atlas, make_atlas
 from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.judge import confidence, refusal
 from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit, pieces, refine
-from weldsim.seam.profile.valley import trace_valleys, valley_images
+from weldsim.seam.profile.valley import CoarseLine
 
 MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
-SURROUNDINGS = 0.042  # [m] points within this of a coarse line take part in its fit
 
 
 def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_factor: float = 1.0) -> SeamFindings:
@@ -33,19 +31,18 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
         cloud: in B, at least a few hundred points.
         threshold_factor: multiplies the coarse threshold, to see how much it matters.
     """
-    chart = make_chart(cloud)
-    images = valley_images(chart, config, threshold_factor)
-    threshold = Threshold(name="valley depth along 25 mm", value=images[0].threshold, unit="m", noise=images[0].noise)
+    atlas = make_atlas(cloud)
+    lines, threshold = atlas.coarse_lines(config, threshold_factor)
     accepted: list[tuple[Fit, tuple[float, float], float]] = []
     rejected: list[Rejection] = []
-    for coarse in trace_valleys(images, config):
+    for coarse in lines:
         line = coarse.points
         if coarse.level < MIN_LEVEL:
             rejected.append(_rejection(line, f"surface at one level on both sides over only {coarse.level:.0%} of it"))
             continue
         if any(_covers(fit, line) for fit, _, _ in accepted):
             continue
-        fit = _refine_whole(chart, line, cloud, config)
+        fit = _refine_whole(atlas, coarse, config)
         if fit is None:
             rejected.append(_rejection(line, "no parent surface on both sides at one level"))
             continue
@@ -58,18 +55,19 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     accepted.sort(key=lambda found: (-round(found[2], 2), found[1][0] - found[1][1]))
     region = np.zeros(len(cloud), np.int32)
     for number, (fit, span, _) in enumerate(accepted, start=1):
-        _mark_region(region, number, cloud, chart, fit, span)
+        _mark_region(region, number, atlas, fit, span)
     seams = tuple(_seam(fit, span, sure) for fit, span, sure in accepted)
     return SeamFindings(seams=seams, region=region, rejected=tuple(rejected), threshold=threshold, method="profile")
 
 
-def _refine_whole(chart: Chart, line: Float[ndarray, "k 3"], cloud: PointCloud, config: ProfileConfig) -> Fit | None:
+def _refine_whole(atlas: Atlas, coarse: CoarseLine, config: ProfileConfig) -> Fit | None:
     """The fit of a coarse line; begun again, with the points around, where the groove goes on far beyond the line."""
-    origins, fit = cloud.sight_origins(), None
+    cloud, line, normals = atlas.cloud, coarse.points, coarse.normals
+    fit = None
     for _ in range(3):
         most = int(config.points_per_metre * (arc_length(line)[-1] + 2 * SURROUNDINGS))
-        picked = _surroundings(chart, line, most)
-        fit = refine(line, -chart.axes[2], cloud.points[picked], None if origins is None else origins[picked], config)
+        picked = atlas.around(line, normals, most)
+        fit = refine(line, unit(normals.mean(axis=0)), cloud.points[picked], atlas.sight_origins(picked), config)
         if fit is None:
             return None
         core = pieces(fit.track.weight > 0, fit.rail.step)[0]
@@ -77,7 +75,7 @@ def _refine_whole(chart: Chart, line: Float[ndarray, "k 3"], cloud: PointCloud, 
         beyond = max(np.linalg.norm(line - end, axis=1).min() for end in (found[0], found[-1]))
         if beyond < 0.5 * SURROUNDINGS:
             break
-        line = found
+        line, normals = found, fit.rail.n[core]
     return fit
 
 
@@ -94,31 +92,11 @@ def _covers(fit: Fit, line: Float[ndarray, "k 3"]) -> bool:
     return bool(np.mean(distance < 0.6 * fit.section.width) > 0.5)
 
 
-def _surroundings(chart: Chart, line: Float[ndarray, "k 3"], most: int) -> Int[ndarray, "m"]:
-    """Indices of the points within SURROUNDINGS of a line (as the chart sees it), thinned evenly to `most`."""
-    far = np.ones(chart.valid.shape, np.uint8)
-    local = (line - chart.origin) @ chart.axes.T
-    uv = local[:, :2] / local[:, 2:] if chart.perspective else local[:, :2]
-    column, row = np.clip(((uv - chart.corner) / chart.step).astype(int), 0, np.array(far.shape[::-1]) - 1).T
-    far[row, column] = 0
-    near = cv2.distanceTransform(far, cv2.DIST_L2, 3) < SURROUNDINGS / chart.pitch
-    index = np.flatnonzero(np.concatenate([near.ravel(), [False]])[chart.cell])
-    if len(index) <= most:
-        return index
-    # Random: an even stride would beat against the rows of a depth image. By a rank that each point of the cloud keeps,
-    # whatever else is near: with one point more or less around a line, a draw among them would be another sample.
-    rank = np.random.default_rng(0).random(len(chart.cell))[index]
-    return index[np.sort(np.argpartition(rank, most)[:most])]
-
-
-def _mark_region(
-    region: Int[ndarray, "n"], number: int, cloud: PointCloud, chart: Chart, fit: Fit, span: tuple[float, float]
-) -> None:
+def _mark_region(region: Int[ndarray, "n"], number: int, atlas: Atlas, fit: Fit, span: tuple[float, float]) -> None:
     """Write `number` at the points whose sight line enters between the lips of a groove."""
-    rail_part = fit.rail.points[station_mask(fit, span)]
-    near = _surroundings(chart, rail_part, len(cloud))
-    origins = cloud.sight_origins()
-    strip = lay_out(fit.rail, cloud.points[near], None if origins is None else origins[near])
+    part, cloud = station_mask(fit, span), atlas.cloud
+    near = atlas.around(fit.rail.points[part], fit.rail.n[part], len(cloud))
+    strip = lay_out(fit.rail, cloud.points[near], atlas.sight_origins(near))
     s, x, depth = ray_coordinates(strip, fit.parent)
     inside: Bool[ndarray, "k"] = (np.abs(x) <= fit.section.width / 2) & (s >= span[0]) & (s <= span[1]) & (depth > -0.004)
     region[near[inside]] = number

@@ -13,6 +13,8 @@ from numpy import ndarray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from weldsim.curves import interpolate
+from weldsim.frames import unit
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.chart import Chart
 
@@ -22,6 +24,7 @@ LINE = 0.025  # [m] length over which a valley is averaged along itself
 MODE_REACH = 0.35  # slopes this far from a mode, either way, belong to it
 MODE_SHARE = 0.10  # of the cells that a slope must have to get a valley image of its own
 MOST_MODES = 3
+PLANE_REACH = 0.016  # [m] about a line's cell, over which its surface is taken as plane
 FAR = 10.0  # [m] stands for "no material" in the closing
 
 
@@ -165,11 +168,13 @@ class CoarseLine:
 
     Attributes:
         points: (k, 3) on the lid, in the cloud's frame [m].
-        evidence: valley depth summed along it [m cells].
+        normals: (k, 3) unit, outward, of the surface around it.
+        evidence: valley depth integrated along it [m^2].
         level: fraction of it with surface at one level on both sides; tails without are cut off.
     """
 
     points: Float[ndarray, "k 3"]
+    normals: Float[ndarray, "k 3"]
     evidence: float
     level: float
 
@@ -210,9 +215,34 @@ def _trace(valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
         keep = _longest_run(level, round(0.020 / chart.pitch))
         if (keep.stop - keep.start) * chart.pitch < 0.6 * config.min_length:
             keep = slice(0, len(line))  # stays a candidate only to be named among the refused
-        evidence = float(valleys.lined[row[keep], column[keep]].sum())
-        out.append(CoarseLine(points[keep], evidence, float(level[keep].mean())))
+        evidence = chart.pitch * float(valleys.lined[row[keep], column[keep]].sum())
+        out.append(CoarseLine(points[keep], _normals(valleys, line[keep]), evidence, float(level[keep].mean())))
     return out
+
+
+def _normals(valleys: ValleyImage, line: Float[ndarray, "k 2"]) -> Float[ndarray, "k 3"]:
+    """Outward normals of the closed surface along a line, from planes fitted to it around a few of its cells."""
+    chart = valleys.chart
+    reach = max(2, round(PLANE_REACH / chart.pitch))
+    stride = max(1, reach // 8)
+    marks = np.unique(np.linspace(0, len(line) - 1, max(2, min(9, round(len(line) / reach)))).round().astype(int))
+    found = []
+    for u, v in line[marks].round().astype(int):
+        rows, columns = np.mgrid[max(v - reach, 0) : v + reach + 1 : stride, max(u - reach, 0) : u + reach + 1 : stride]
+        inside = (rows < chart.valid.shape[0]) & (columns < chart.valid.shape[1])
+        rows, columns = rows[inside], columns[inside]
+        use = valleys.around[rows, columns]
+        design = np.stack([columns - u, rows - v, np.ones(len(rows))], axis=1)[use].astype(float)
+        height = valleys.lid[rows[use], columns[use]]
+        plane = np.zeros(3)
+        if len(height) >= 6:
+            plane = np.linalg.lstsq(design, height, rcond=None)[0]
+        corners = chart.to_space(
+            u + np.array([0.0, 1.0, 0.0]), v + np.array([0.0, 0.0, 1.0]), plane[2] + np.array([0.0, *plane[:2]])
+        )
+        normal = unit(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
+        found.append(-normal if normal @ chart.axes[2] > 0 else normal)
+    return unit(interpolate(marks.astype(float), np.array(found), np.arange(len(line), dtype=float)))
 
 
 def _longest_run(level: Bool[ndarray, "k"], bridge: int) -> slice:
