@@ -91,7 +91,7 @@ class D415Config:
         """The config of one unit out of many: `base` (the defaults) with the figures that differ between units, or that
         nobody has measured, drawn from their ranges.
 
-        Focal length +-1.5 %, baseline +-0.3 mm, window 9 to 13, disparity_sigma 0.05 to 0.10 px, pixel_locking 0 to
+        Focal length +-1.5 %, baseline +-0.3 mm, window 9, 11 or 13, disparity_sigma 0.05 to 0.10 px, pixel_locking 0 to
         0.12 px, temporal_fraction 0.1 to 0.7, all uniform. A function of the seed alone.
         """
         rng, base = np.random.default_rng([0xD415, seed]), base or cls()
@@ -99,13 +99,15 @@ class D415Config:
             base,
             focal_scale=float(rng.uniform(1 - FOCAL_SPREAD, 1 + FOCAL_SPREAD)),
             baseline=base.baseline + float(rng.uniform(-BASELINE_SPREAD, BASELINE_SPREAD)),
-            window=int(rng.integers(9, 14)),
+            window=int(rng.choice((9, 11, 13))),
             disparity_sigma=float(rng.uniform(0.05, 0.10)),
             pixel_locking=float(rng.uniform(0.0, 0.12)),
             temporal_fraction=float(rng.uniform(0.1, 0.7)),
         )
 
     def __post_init__(self) -> None:
+        if self.window % 2 == 0:  # it would shift the image by half a pixel
+            raise ConfigError(f"sensor.window: {self.window} must be odd", key="window", value=self.window)
         positive = ("focal_scale", "baseline", "correlation", "window", "relief_limit", "max_disparity", "edge_step")
         for name in positive:
             if not getattr(self, name) > 0:

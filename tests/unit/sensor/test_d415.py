@@ -273,7 +273,7 @@ def test_an_empty_view_gives_an_empty_image() -> None:
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("baseline", 0.0), ("window", -1), ("disparity_sigma", -0.1), ("temporal_fraction", 1.5)],
+    [("baseline", 0.0), ("window", -1), ("window", 10), ("disparity_sigma", -0.1), ("temporal_fraction", 1.5)],
 )
 def test_impossible_figures_are_refused(key: str, value: float) -> None:
     with pytest.raises(ConfigError, match=key):
