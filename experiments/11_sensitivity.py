@@ -126,7 +126,7 @@ def draw(measured: dict[str, list[dict[str, Any]]], path: Path) -> None:
             middles = [(v, statistics.median(m)) for v in scanned if (m := [1e3 * r["mean"] for r in found if r["value"] == v])]
             place.plot([x[v] for v, _ in middles], [m for _, m in middles], "-", color=colour, lw=2, label=NAMES[method])
         place.set_yscale("log")
-        place.set_ylim(0.03, CEILING)
+        place.set_ylim(0.02, CEILING)
         place.set_yticks([0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10], labels=["0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10"])
         place.set_xlabel(sweep.label)
         place.grid(color="#e3e7eb", lw=0.8)
