@@ -3,6 +3,7 @@
 One source is switched on at a time, over several units and seeds, in a cell that is otherwise perfect: exact camera, right
 calibration. What is left without any (the finder's own error, exact depth) is the first column; then the sensor's noise, its
 other faults (blur, steps, locking), an offset of the whole view, the hand-eye calibration, the arm's geometry, the controller.
+The model's noise is greater where its window sees relief: that product of noise and window shows under "all" alone.
 The figure is the mean cross-track distance of the executed tip from the known opening; the controller's is that of the tip
 from the plan (p95). Sizes: offset 3.5 mm rms (thesis table 6.2), hand-eye 1 mm and 0.1 deg (three calibrations of the thesis
 author's agree within 1 mm), arm 0.1 mm and 0.01 deg a joint (an assumption: the remainder after a factory calibration).

@@ -8,6 +8,7 @@ from weldsim.frames import matrix_from_rotation_vector, unit
 from weldsim.seam.thesis.boundary import boundary
 from weldsim.seam.thesis.clusters import euclidean_clusters
 from weldsim.seam.thesis.descriptor import gradient
+from weldsim.seam.thesis.grid import FEW, THREADS, threads
 from weldsim.seam.thesis.mls import smooth
 from weldsim.seam.thesis.normals import normals_towards, principal_axes
 from weldsim.seam.thesis.voxel import voxel_centroids
@@ -39,6 +40,18 @@ def test_principal_axes_are_those_of_the_ball(seed: int) -> None:
         rotated = axes[i].T @ scatter @ axes[i]
         np.testing.assert_allclose(rotated, np.diag(np.diag(rotated)), atol=1e-15)
         assert np.diff(np.diag(rotated)).max() <= 1e-15  # widest first, the normal last
+
+
+def test_results_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = random_cloud(1, 3 * FEW)
+    results = []
+    for allowed in ("1", "2", "64", "", "nonsense"):
+        monkeypatch.setenv("OMP_NUM_THREADS", allowed)
+        assert threads() == (1 if allowed == "1" else THREADS)
+        results.append(principal_axes(points, 0.002))
+    for other in results[1:]:
+        for mine, yours in zip(results[0], other, strict=True):
+            np.testing.assert_array_equal(mine, yours)
 
 
 @pytest.mark.parametrize("seed", range(4))
