@@ -1,5 +1,6 @@
 """The joint path along a rail by differential kinematics (mink): tip and wire axis held, rotation about the wire free."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mink
@@ -24,6 +25,9 @@ ITERATIONS = 40
 SETTLED = 1e-7  # [rad] a smaller step ends the iteration
 HALVINGS = 5
 LOOK = 0.005  # [m] between collision checks along a piece
+
+
+Rest = Float[ndarray, "6"] | Callable[[float], Float[ndarray, "6"]]
 
 
 class LostPathError(MotionError):
@@ -51,15 +55,14 @@ class JointPath:
 class _Solver:
     """mink's tasks for one posture; `at` solves one pose from the last solution."""
 
-    def __init__(self, model: mujoco.MjModel, posture: Float[ndarray, "6"], roll_free: bool, config: MotionConfig) -> None:
+    def __init__(self, model: mujoco.MjModel, posture: Rest, roll_free: bool, config: MotionConfig) -> None:
         self.configuration = mink.Configuration(model)
         self.config = config
         self.tip = mink.FrameTask(TORCH_SITE, "site", position_cost=POSITION_COST, orientation_cost=0.0 if roll_free else AXIS_COST)
         self.axis = mink.AxisAlignTask(TORCH_SITE, "site", axis=(0.0, 0.0, 1.0), cost=AXIS_COST)
-        rest = mink.PostureTask(model, cost=POSTURE_COST)
-        rest.set_target(posture)
+        self.rest, self.posture = mink.PostureTask(model, cost=POSTURE_COST), posture
         # A pull towards one posture makes the free rotation a smooth function of the pose, not of the way there.
-        self.tasks = [self.tip, self.axis, rest]
+        self.tasks = [self.tip, self.axis, self.rest]
         limit = mink.ConfigurationLimit(model, min_distance_from_limits=config.limit_margin)
         self.limits = [limit]
 
@@ -72,6 +75,7 @@ class _Solver:
         self.configuration.update(q)
         self.tip.set_target(mink.SE3.from_matrix(X_BT.matrix))
         self.axis.set_target(X_BT.R[:, 2])
+        self.rest.set_target(self.posture(s) if callable(self.posture) else self.posture)
         for _ in range(ITERATIONS):
             try:
                 step = mink.solve_ik(
@@ -103,7 +107,7 @@ def _angle(a: Float[ndarray, "n 3"], b: Float[ndarray, "n 3"]) -> Float[ndarray,
 def follow(
     rail: Rail,
     q_first: Float[ndarray, "6"],
-    posture: Float[ndarray, "6"],
+    posture: Rest,
     model: mujoco.MjModel,
     X_FT: Transform,
     config: MotionConfig,
@@ -112,7 +116,7 @@ def follow(
 
     Args:
         q_first: where the iteration starts, near a solution of the first pose [rad].
-        posture: what the free rotation about the wire is drawn to [rad].
+        posture: what the free rotation about the wire is drawn to [rad], everywhere or as a function of arc length.
     Raises:
         LostPathError: no solution in this posture, a branch flip, or a spline that will not settle.
     """

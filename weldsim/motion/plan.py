@@ -8,14 +8,15 @@ from numpy import ndarray
 
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
+from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, torch_pose
 from weldsim.motion.air import air_moves
-from weldsim.motion.arm import kinematic_model
+from weldsim.motion.arm import clearances, dexterity, kinematic_model
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import JointPath, LostPathError, check_clear, follow
-from weldsim.motion.posture import Blocked, Posture, find_postures, unreachable
+from weldsim.motion.posture import Blocked, Posture, find_postures, roll_frames, unreachable
 from weldsim.motion.rail import Rail, make_rail
 from weldsim.motion.timing import Move, piece_move
+from weldsim.motion.winding import winding_posture
 from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import JointTrajectory, Segment, TorchPath
 
@@ -103,9 +104,53 @@ def plan_motion(
 def _first_that_holds(
     rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
 ) -> tuple[Posture, list[JointPath], list[Move]]:
-    """The best posture that can be followed all along and reached through the air, with its joint paths and moves."""
+    """The best posture that can be followed all along and reached through the air, with its joint paths and moves.
+
+    Postures of one rotation about the wire come first; where none holds, one whose rotation changes on the way.
+    """
     if blocked is not None and (touch := blocked(q_start)) is not None:
         raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch)
+    try:
+        return _swept(rail, q_start, X_FT, config, blocked)
+    except MotionError:
+        found = _wound(rail, q_start, X_FT, config, blocked) if rail.roll_free else None
+        if found is None:
+            raise
+        return found
+
+
+def _wound(
+    rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
+) -> tuple[Posture, list[JointPath], list[Move]] | None:
+    """A posture that turns about the wire on the way, with its joint paths and moves; None where it does not hold either."""
+    found = winding_posture(rail, q_start, X_FT, config, blocked)
+    if found is None:
+        return None
+    first, rest = found
+    try:
+        paths = follow(rail, first, rest, kinematic_model(X_FT), X_FT, config)
+        if blocked is not None:
+            check_clear(paths, blocked)
+        moves = _moves(rail, paths, q_start, X_FT, config, blocked)
+    except MotionError:
+        return None
+    q = np.concatenate([path.spline(path.spline.x) for path in paths])
+    reached = torch_pose(q[:1], X_FT).R[0]
+    asked = roll_frames(rail.at(rail.s[:1]))[0]
+    posture = Posture(
+        q=q,
+        roll=float(np.arctan2(reached[:, 0] @ asked[:, 1], reached[:, 0] @ asked[:, 0])),
+        cost=0.0,
+        dexterity=float(dexterity(q, X_FT).min()),
+        clearance=float(clearances(q, config.floor, X_FT).min()),
+    )
+    return posture, paths, moves
+
+
+def _swept(
+    rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
+) -> tuple[Posture, list[JointPath], list[Move]]:
+    """The best posture of one rotation about the wire that holds. Raises MotionError."""
     postures = find_postures(rail, q_start, X_FT, config, blocked)
     model = kinematic_model(X_FT)
     lost: list[LostPathError] = []
