@@ -19,6 +19,7 @@ from weldsim.execution.config import ExecutionConfig
 from weldsim.motion.config import MotionConfig
 from weldsim.path.config import PathConfig
 from weldsim.report.limits import ReportConfig
+from weldsim.scan.config import ScanConfig
 from weldsim.scene.miscalibration import TwinConfig
 from weldsim.schema import describe, structure, to_json
 from weldsim.seam.config import SeamConfig
@@ -50,6 +51,9 @@ class CellConfig:
 
     cloud: CloudConfig = field(default_factory=CloudConfig)
     """What is kept of the cloud."""
+
+    scan: ScanConfig = field(default_factory=ScanConfig)
+    """How the arm goes to the scan views, and how views are chosen."""
 
     seam: SeamConfig = field(default_factory=SeamConfig)
     """Which seam finder runs, and its settings."""

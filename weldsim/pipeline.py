@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from weldsim.motion.plan import MotionPlan
+    from weldsim.scan.tour import Tour
     from weldsim.scene.config import SceneConfig
     from weldsim.scene.world import World
     from weldsim.sensor.base import Capture
@@ -68,6 +70,7 @@ class Sighting:
     Attributes:
         world: the compiled scene.  captures: one a view.  cloud: all views in the base, as perception receives it.
         registration: how several views were lined up; None for one.
+        tour: how the arm was driven from view to view; None where it was put there.
         seed, sensor: what it was seen with.  timing: seconds a stage.
     """
 
@@ -75,6 +78,7 @@ class Sighting:
     captures: tuple["Capture", ...]
     cloud: PointCloud
     registration: Registration | None
+    tour: "Tour | None"
     seed: int
     sensor: SensorName
     timing: dict[str, float]
@@ -96,11 +100,13 @@ class PlanResult:
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunResult:
     """A whole job on the twin. Attributes: world; captures, one a view; registration, how they were lined up, None for one;
-    plan; welded, the index of the seam that was welded; motion and log, None where there was nothing to weld; report."""
+    tour, how the arm was driven to them, None where it was put there; plan; welded, the index of the seam that was welded;
+    motion and log, None where there was nothing to weld; report."""
 
     world: "World"
     captures: tuple["Capture", ...]
     registration: Registration | None
+    tour: "Tour | None"
     plan: PlanResult
     welded: int
     motion: "MotionPlan | None"
@@ -186,6 +192,7 @@ def look(
     seed: int = 0,
     sensor: SensorName = "d415",
     world: "World | None" = None,
+    move: bool = False,
     clock: Clock | None = None,
 ) -> Sighting:
     """The scene built and scanned from all its views, which are lined up and merged into one cloud in the robot base.
@@ -193,6 +200,7 @@ def look(
     Args:
         scene: what stands on the table.  config: everything else.
         seed: of the camera's noise.  sensor: which camera looks.
+        move: whether the arm is driven from view to view and starts the weld from there (never for the Kinect), or put there.
         world: `scene` already built, by whoever looks at it several times.  clock: takes the times.
     Raises:
         SceneError, UnreachableError, SensorError, CloudError: see the stages.
@@ -203,12 +211,27 @@ def look(
     with clock.stage("scene"):
         world = build_world(scene, twin=config.twin) if world is None else world
     with clock.stage("sensor"):
-        captures = scan(world, config, seed, sensor)
+        tour = _tour(world, config, seed, sensor, clock) if move and sensor != "kinect" else None
+        captures = scan(world, config, seed, sensor) if tour is None else tour.captures
     with clock.stage("cloud"):
         cloud, found = merge_views([deproject(capture.frame) for capture in captures], config.cloud.register)
     return Sighting(
-        world=world, captures=captures, cloud=cloud, registration=found, seed=seed, sensor=sensor, timing=dict(clock.seconds)
+        world=world,
+        captures=captures,
+        cloud=cloud,
+        registration=found,
+        tour=tour,
+        seed=seed,
+        sensor=sensor,
+        timing=dict(clock.seconds),
     )
+
+
+def _tour(world: "World", config: CellConfig, seed: int, sensor: SensorName, clock: Clock) -> "Tour":
+    from weldsim.scan.tour import drive
+
+    tell = partial(clock.tell, "sensor")
+    return drive(world, config, config.motion, config.execution, seed=seed, sensor=sensor, tell=tell)
 
 
 def run(
@@ -234,7 +257,7 @@ def run(
         WeldsimError: see the stages; finding no seam is a result, not an error.
     """
     config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
-    seen = look(scene, config, seed=seed, sensor=sensor, clock=clock)
+    seen = look(scene, config, seed=seed, sensor=sensor, move=config.scan.move, clock=clock)
     result = plan(seen.cloud, config, clock=clock)
     return finish(seen, result, config, number=number, near=near, video=video, clock=clock)
 
@@ -284,6 +307,7 @@ def finish(
         world=world,
         captures=seen.captures,
         registration=seen.registration,
+        tour=seen.tour,
         plan=result,
         welded=welded,
         motion=motion,
@@ -324,7 +348,7 @@ def _weld(
     from weldsim.motion.plan import plan_motion
 
     world, last = seen.world, len(seen.captures) - 1
-    q_start = posture(world, seen.sensor, last)
+    q_start = posture(world, seen.sensor, last) if seen.tour is None else seen.tour.q
     with clock.stage("motion"):
         motion = plan_motion(path, q_start, config.motion, blocked=CellCollision(world.model))
     with clock.stage("execution"), ExitStack() as stack:

@@ -49,8 +49,8 @@ def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "Scene
     """The folder, in place of an earlier run's.
 
     It holds config.json (resolved), path.json, path.csv, cloud.ply, a depth image with intrinsics and pose for each view,
-    views.json where there were several (how they were lined up), report.json, report.html, report.png, log.npz where the arm
-    moved, and run.json, which says what is what.
+    scan.npz where the arm was driven to them, views.json where there were several (how they were lined up), report.json,
+    report.html, report.png, log.npz where the arm moved, and run.json, which says what is what.
 
     Raises:
         OutputError: it cannot be written; nothing is left then.
@@ -81,6 +81,8 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     for index, capture in enumerate(result.captures):
         name = "depth" if len(result.captures) == 1 else f"depth_{index}"
         write_depth_frame(folder / f"{name}.png", capture.frame, depth_unit=depth_step(sensor, config))
+    if result.tour is not None:
+        write_whole(folder / "scan.npz", tour_bytes(result.tour.logs))
     if result.registration is not None:
         _write_json(folder / "views.json", views_document(result.registration))
     _write_json(folder / "report.json", report_json(report, config.report))
@@ -106,6 +108,16 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
 def views_document(found: Registration) -> dict[str, Any]:
     """How views were lined up, as JSON values [m], [rad]."""
     return {"schema": "weldsim.views/1", "units": {"length": "m", "angle": "rad"}, **asdict(found)}
+
+
+def tour_bytes(logs: tuple[ExecutionLog, ...]) -> bytes:
+    """The arm's way from view to view as an NPZ: arrays as in the log of a weld, and `view`, which view each row leads to."""
+    names = ("t", "q_cmd", "q_act", "qd_act")
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(log, name) for log in logs]) for name in names}
+    arrays["view"] = np.repeat(np.arange(len(logs)), [len(log.t) for log in logs])
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
 
 
 def log_bytes(log: ExecutionLog) -> bytes:

@@ -1,4 +1,4 @@
-"""Moves through the air between the start configuration and the rail, straight in joint space or over a lifted point."""
+"""Moves through the air between the start configuration and the rail, straight in joint space, over a lifted point, or round."""
 
 from itertools import pairwise
 
@@ -12,10 +12,11 @@ from weldsim.kinematics import JOINT_LIMIT, inverse_near, torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import LostPathError
 from weldsim.motion.posture import HOP, Blocked
+from weldsim.motion.roam import roam, touched
 from weldsim.motion.timing import Move, air_move
 
 LIFTS = (0.0, 0.1, 0.2, 0.3)  # [m] how far back along the wire a detour begins, tried in order
-STEP = 0.02  # [rad] of the fastest joint between collision checks
+ROAMS = 400  # tries of the search for a way round
 
 
 def air_moves(
@@ -29,7 +30,8 @@ def air_moves(
 ) -> list[Move]:
     """The moves from q_home to q_rail, or the other way with `back`, that touch nothing.
 
-    A straight joint move if it is clear; else one that stops at a point lifted off the rail along the wire.
+    A straight joint move if it is clear; else one that stops at a point lifted off the rail along the wire; else a way that a
+    random search finds.
 
     Raises:
         LostPathError: neither is clear; `data`: s, reason.
@@ -44,10 +46,17 @@ def air_moves(
             stops.insert(1, lifted)
         if back:
             stops.reverse()
-        found = next((t for a, b in pairwise(stops) if (t := _touched(a, b, blocked)) is not None), None)
+        found = (
+            None if blocked is None else next((t for a, b in pairwise(stops) if (t := touched(a, b, blocked)) is not None), None)
+        )
         if found is None:
             return [air_move(a, b, s, config) for a, b in pairwise(stops)]
         touch = touch or found
+    if (
+        blocked is not None
+        and (corners := roam(*((q_rail, q_home) if back else (q_home, q_rail)), blocked, tries=ROAMS)) is not None
+    ):
+        return [air_move(a, b, s, config) for a, b in pairwise(corners)]
     raise LostPathError(f"the air move {'home' if back else 'to the weld'}: {touch}", s=s, reason=f"{touch}")
 
 
@@ -59,12 +68,3 @@ def _lifted(q: Float[ndarray, "6"], lift: float, X_FT: Transform) -> Float[ndarr
     except UnreachableError:
         return None
     return lifted if np.abs(lifted - q).max() < HOP and np.abs(lifted).max() <= JOINT_LIMIT else None
-
-
-def _touched(a: Float[ndarray, "6"], b: Float[ndarray, "6"], blocked: Blocked | None) -> str | None:
-    """What the straight joint move from a to b touches first, or None."""
-    if blocked is None:
-        return None
-    n = int(np.ceil(np.abs(b - a).max() / STEP))
-    looks = a + np.linspace(0.0, 1.0, n + 2)[:, None] * (b - a)
-    return next((touch for q in looks if (touch := blocked(q)) is not None), None)

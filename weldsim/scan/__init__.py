@@ -1,0 +1,1 @@
+"""Scanning: which views to take (`plan`), and the arm's way to them (`tour`)."""

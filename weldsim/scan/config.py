@@ -1,0 +1,50 @@
+"""ScanConfig: how the arm goes to the scan views, and how views are chosen where the scene leaves it open."""
+
+from dataclasses import dataclass
+
+from weldsim.errors import ConfigError
+from weldsim.quantity import Metre, Radian
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScanConfig:
+    """Settings of the scan (`weldsim.scan.tour`, `weldsim.scan.plan`)."""
+
+    move: bool = True
+    """Whether `weldsim run` drives the simulated arm from view to view; without, it stands at each as if it had been put there."""
+
+    nearest: Metre = 0.33
+    """Least depth at which a chosen view sees a place of the part."""
+
+    farthest: Metre = 0.47
+    """Greatest depth at which it sees it; a stereo camera's noise grows with the square."""
+
+    incidence: Radian = 0.7854
+    """Greatest angle between the sight line and the surface's normal (45 deg)."""
+
+    margin: float = 0.08
+    """Share of the image at each border that is not counted on."""
+
+    surroundings: Metre = 0.025
+    """How far from the groove the part's surface has to be seen."""
+
+    coverage: float = 0.97
+    """Share of the groove's surroundings that has to be seen; less is refused."""
+
+    most: int = 8
+    """Greatest number of views."""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.nearest < self.farthest:
+            raise ConfigError(
+                f"scan: nearest {self.nearest:g} m and farthest {self.farthest:g} m; the first must be positive and less",
+                key="nearest",
+            )
+        if not 0 < self.incidence < 1.5:
+            raise ConfigError(f"scan.incidence = {self.incidence:g} rad: expected over 0 and under 1.5", key="incidence")
+        if not 0 <= self.margin < 0.4:
+            raise ConfigError(f"scan.margin = {self.margin:g}: expected 0 to 0.4", key="margin")
+        if not 0 < self.coverage <= 1:
+            raise ConfigError(f"scan.coverage = {self.coverage:g}: expected over 0, at most 1", key="coverage")
+        if not self.surroundings > 0 or self.most < 1:
+            raise ConfigError("scan: surroundings must be positive and most at least 1", key="surroundings")
