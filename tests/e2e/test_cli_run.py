@@ -20,7 +20,7 @@ pytestmark = pytest.mark.render
 
 FILES = {
     *("config.json", "path.json", "path.csv", "cloud.ply", "depth.png", "depth.intrinsics.json", "depth.pose.json"),
-    *("report.json", "report.html", "report.png", "run.json"),
+    *("scan.npz", "report.json", "report.html", "report.png", "run.json"),
 }
 
 
