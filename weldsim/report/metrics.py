@@ -46,6 +46,7 @@ class SeamMatch:
         fragments: found seams that lie on a known seam which a longer one already stands for.
         phantoms: found seams that are no seam.  missed: known seams that nothing stands for.
         phantom_length: total length of the phantoms [m].
+        owners: for each found seam, the known seam on which it lies; -1 for a phantom.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -53,6 +54,7 @@ class SeamMatch:
     phantoms: tuple[int, ...]
     missed: tuple[int, ...]
     phantom_length: float
+    owners: tuple[int, ...]
 
 
 def known_line(known: KnownSeam, reference: Reference = "opening") -> Float[ndarray, "n 3"]:
@@ -198,6 +200,7 @@ def match_seams(found: tuple[Seam, ...], known: tuple[KnownSeam, ...], within: M
         phantoms=tuple(phantoms),
         missed=tuple(j for j in range(len(known)) if j not in pairs),
         phantom_length=float(sum(found[i].length for i in phantoms)),
+        owners=tuple(-1 if i in phantoms else int(near[i].argmax()) for i in range(len(found))),
     )
 
 

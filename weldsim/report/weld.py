@@ -89,14 +89,21 @@ def _against_known(
     trims: tuple[Metre, Metre],
     failures: list[str],
 ) -> WeldReport:
-    """The report with the figures that need the true seams; seams that were missed are added to `failures`."""
+    """The report with the figures that need the true seams; seams that were missed, and a welded line that is a phantom or a
+    piece of a seam, are added to `failures`."""
     match = match_seams(findings.seams, known)
     failures += [f"known seam {known[j].name or j + 1} was not found" for j in match.missed]
     report = replace(report, phantom_seams=len(match.phantoms))
-    partner = {i: known[j] for i, j in match.pairs}.get(welded)
     path = paths[welded] if welded < len(paths) else None
-    if partner is None or path is None:
+    if path is None:
         return report
+    owner = match.owners[welded]
+    if owner < 0:
+        failures.append(f"seam {welded + 1}, the one judged, lies on no known seam")
+        return report
+    partner = known[owner]
+    if welded in match.fragments:
+        failures.append(f"seam {welded + 1}, the one judged, is a piece of known seam {partner.name or owner + 1}")
     seam = findings.seams[welded]
     return replace(
         report,

@@ -87,11 +87,36 @@ def test_missed_and_phantom_seams_fail() -> None:
     assert report.phantom_seams == 1
     assert report.plan is None
     assert any("sine was not found" in reason for reason in report.reasons)
+    assert "seam 1, the one judged, lies on no known seam" in report.reasons
     assert any(reason.startswith("phantom seams 1") for reason in report.reasons)
     plain = weld_report(findings((), region), (), scene="plate", known=())
     assert plain.passed
     assert weld_report(findings((), region), (), scene="plate").reasons == ("no seam was found",)
     assert weld_report(findings((far,), region), (torch_path(far),), scene="scan").passed
+
+
+def test_a_piece_of_a_seam_is_judged_against_the_whole_of_it() -> None:
+    known = sine_seam(np.random.default_rng(3))
+    whole = found_seam(known, np.full(len(known.s), 2e-4))
+    half = slice(0, len(whole.s) // 2)
+    piece = replace(
+        whole,
+        points_B=whole.points_B[half],
+        s=whole.s[half],
+        tangents_B=whole.tangents_B[half],
+        normals_B=whole.normals_B[half],
+        left_B=None,
+        right_B=None,
+        sigma=None,
+    )
+    report = weld_report(
+        findings((piece, whole), np.zeros(5, bool)), (torch_path(piece), torch_path(whole)), scene="x", known=(known,)
+    )
+    assert not report.passed
+    assert report.plan is not None
+    assert 0.4 < report.plan.coverage < 0.6
+    assert "seam 1, the one judged, is a piece of known seam sine" in report.reasons
+    assert report.phantom_seams == 0
 
 
 def test_an_arc_that_never_burned_is_a_failure() -> None:

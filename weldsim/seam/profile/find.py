@@ -21,6 +21,7 @@ from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit, pieces, refine
 from weldsim.seam.profile.valley import CoarseLine
 
+LONG = 0.05  # [m] a seam of this length is half as good as the same one without end
 MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
 
 
@@ -52,7 +53,7 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
             rejected.append(_rejection(line, reason))
         elif not any(_covers(other, fit.rail.points[station_mask(fit, span)]) for other, _, _ in accepted):
             accepted.append((fit, span, confidence(fit, span, config)))
-    accepted.sort(key=lambda found: (-round(found[2], 2), found[1][0] - found[1][1]))
+    accepted.sort(key=_merit, reverse=True)
     region = np.zeros(len(cloud), np.int32)
     for number, (fit, span, _) in enumerate(accepted, start=1):
         _mark_region(region, number, atlas, fit, span)
@@ -77,6 +78,12 @@ def _refine_whole(atlas: Atlas, coarse: CoarseLine, config: ProfileConfig) -> Fi
             break
         line, normals = found, fit.rail.n[core]
     return fit
+
+
+def _merit(found: tuple[Fit, tuple[float, float], float]) -> float:
+    """What puts a seam first: its confidence, and its length as far as more of it is better evidence."""
+    _, (start, end), sure = found
+    return sure * (end - start) / (end - start + LONG)
 
 
 def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:
