@@ -210,6 +210,11 @@ def look(
     config, clock = config or CellConfig(), clock or Clock()
     with clock.stage("scene"):
         world = build_world(scene, twin=config.twin) if world is None else world
+    if config.scan.views == "auto" and sensor != "kinect":
+        from weldsim.scan.plan import plan_views
+
+        with clock.stage("views"):
+            world = replace(world, views=plan_views(world, config.scan).views)
     with clock.stage("sensor"):
         tour = _tour(world, config, seed, sensor, clock) if move and sensor != "kinect" else None
         captures = scan(world, config, seed, sensor) if tour is None else tour.captures

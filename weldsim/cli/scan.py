@@ -1,8 +1,8 @@
 """`weldsim scan`."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
 from weldsim.cli.outputs import check_outputs, check_suffix
@@ -35,6 +35,9 @@ class Scan(ConfigOptions):
     view: int = 1
     """Which view the depth image is of, counted from 1."""
 
+    views: Literal["scene", "auto"] | None = None
+    """Views to take: the scene's own, or chosen from the part's drawing (as does --set scan.views=auto)."""
+
     def __call__(self) -> int:
         """0."""
         from weldsim.cloud.depth_output import depth_file_names
@@ -45,7 +48,9 @@ class Scan(ConfigOptions):
         files = () if self.depth is None else depth_file_names(self.depth)
         check_outputs((self.out, *files), (self.config,))
         config, scene = self.cell(), self.scene_of(self.scene)
-        views = 1 if self.sensor == "kinect" else len(scene.views)
+        if self.views is not None:
+            config = replace(config, scan=replace(config.scan, views=self.views))
+        views = 1 if self.sensor == "kinect" else config.scan.most if config.scan.views == "auto" else len(scene.views)
         if not 1 <= self.view <= max(1, views):
             raise InputError(f"--view {self.view}: scene {scene.name!r} has {views}, counted from 1", view=self.view)
         choose_platform()
@@ -56,6 +61,8 @@ class Scan(ConfigOptions):
         with progress() as tell:
             seen = look(scene, config, seed=self.seed, sensor=self.sensor, clock=Clock(tell))
         captures, cloud, found = seen.captures, seen.cloud, seen.registration
+        if self.view > len(captures):
+            raise InputError(f"--view {self.view}: {len(captures)} were taken, counted from 1", view=self.view)
         self._write(cloud, captures[self.view - 1].frame, depth_step(self.sensor, config))
         written = [str(path) for path in (self.out, *files) if path is not None]
         if self.json:

@@ -1,6 +1,7 @@
 """ScanConfig: how the arm goes to the scan views, and how views are chosen where the scene leaves it open."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from weldsim.errors import ConfigError
 from weldsim.quantity import Metre, Radian
@@ -9,6 +10,9 @@ from weldsim.quantity import Metre, Radian
 @dataclass(frozen=True, kw_only=True)
 class ScanConfig:
     """Settings of the scan (`weldsim.scan.tour`, `weldsim.scan.plan`)."""
+
+    views: Literal["scene", "auto"] = "scene"
+    """Which views are taken: the scene's own, or ones chosen from the part's nominal geometry (`weldsim.scan.plan`)."""
 
     move: bool = True
     """Whether `weldsim run` drives the simulated arm from view to view; without, it stands at each as if it had been put there."""
