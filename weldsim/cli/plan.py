@@ -228,6 +228,11 @@ class Plan(ConfigOptions):
                 ]
             )
         print(table(rows, ("seam", "length", "width", "depth", "confidence", "sigma", "reference", "poses")))
+        for number, seam in zip(numbers, chosen.findings.seams, strict=True):
+            for s0, s1 in seam.gaps:
+                print(
+                    f"  seam {number}: {units.to_mm(s0):.0f} to {units.to_mm(s1):.0f} mm not measured, the line is carried across"
+                )
         for clause in unplanned(chosen):
             print(f"  {clause}")
         print(times(clock.seconds))

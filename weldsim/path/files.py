@@ -177,6 +177,7 @@ def _seam_entry(number: int, seam: Seam, path: TorchPath) -> dict[str, Any]:
         "speed": round(float(np.median(path.speed[weld])), DECIMALS),
         "points": _numbers(seam.points_B),
         "sigma": [] if seam.sigma is None else _numbers(seam.sigma),
+        "gaps": [_numbers(np.array(gap)) for gap in seam.gaps],
         "poses": [{"s": s, "position": p, "quaternion_wxyz": q} for s, p, q in poses],
     }
 
@@ -215,6 +216,7 @@ def _check_seam(seam: Any, where: str) -> None:
     points = _array(seam.get("points"), (3,), f"{where}.points")
     _need(len(points) >= 2, where, f"{len(points)} points; a seam needs two")
     _array(seam.get("sigma", []), (), f"{where}.sigma")
+    _array(seam.get("gaps", []), (2,), f"{where}.gaps")
     poses = seam.get("poses")
     _need(isinstance(poses, list) and all(isinstance(pose, dict) for pose in poses), where, "poses is no list of objects")
     _need(len(poses) >= 2, where, f"{len(poses)} poses; a path needs two")

@@ -32,6 +32,8 @@ class Seam:
         confidence: 0 to 1.
         joint, reference: which kind of joint, and which line of it `points_B` follows.
         closed: whether the seam is a ring: its last point then repeats its first.
+        gaps: stretches (s0, s1) of arc length [m] that were not measured, ordered: under a clamp or a tack weld, say. The
+            line is carried across them; whether a torch can pass is the user's to know.
     """
 
     points_B: Float[ndarray, "n 3"]
@@ -48,6 +50,7 @@ class Seam:
     joint: Joint = "groove"
     reference: Reference = "opening"
     closed: bool = False
+    gaps: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         store(self, "points_B", self.points_B, shape=("n", 3))
@@ -68,6 +71,13 @@ class Seam:
         gap = float(np.linalg.norm(self.points_B[-1] - self.points_B[0])) if self.closed else 0.0
         require(gap <= JOINED, self, "closed", f"the ends lie {1e3 * gap:.3g} mm apart; a ring's last point repeats its first")
         require(0.0 <= self.confidence <= 1.0, self, "confidence", f"{self.confidence} is outside 0 to 1")
+        bounds = [at for gap in self.gaps for at in gap]
+        require(
+            bounds == sorted(bounds) and all(self.s[0] <= at <= self.s[-1] for at in bounds),
+            self,
+            "gaps",
+            f"{self.gaps} are not ordered stretches within 0 to {float(self.s[-1]):g} m",
+        )
 
     @property
     def length(self) -> float:

@@ -95,6 +95,11 @@ def uncertainty(seam: Seam) -> Figure:
     for axis, value in top.items():
         layout[axis] |= {"range": [0.0, value]} if value > 0 else {"visible": False}
     layout["margin"]["r"] = 56
+    layout["shapes"] = [  # what was not measured
+        {"type": "rect", "xref": "x", "yref": "paper", "x0": 1e3 * s0, "x1": 1e3 * s1, "y0": 0, "y1": 1}
+        | {"line": {"width": 0}, "fillcolor": "rgba(120,120,120,0.18)", "layer": "below"}
+        for s0, s1 in seam.gaps
+    ]
     return {"data": data, "layout": layout}
 
 

@@ -157,6 +157,9 @@ def _cards(report: WeldReport, findings: SeamFindings) -> str:
             cards.append((f"{seam.confidence:.2f}", "confidence"))
         if seam.sigma is not None:
             cards.append((f"{units.to_mm(float(seam.sigma.mean())):.2f} mm", "sigma across, mean"))
+        if seam.gaps:
+            missing = sum(s1 - s0 for s0, s1 in seam.gaps)
+            cards.append((f"{units.to_mm(missing):.1f} mm", f"not measured, in {len(seam.gaps)} gap{'s'[: len(seam.gaps) > 1]}"))
     for name, error in (("plan", report.plan), ("executed", report.executed)):
         if error is not None:
             cards.append((f"{units.to_mm(error.mean):.2f} mm", f"{name} from the known {error.reference}, mean"))

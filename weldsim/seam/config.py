@@ -21,6 +21,8 @@ class ProfileConfig:
         station_step: spacing of the cross-sections along the seam [m].
         max_side_angle: largest angle between the parent surfaces left and right of a groove [rad].
         max_side_step: largest height difference between them at the groove [m].
+        max_gap: pieces of one groove with no more than this between them are joined, past a clamp or missing data [m].
+        max_filled: no more than this of it may show the plate's own surface, as a tack weld filed flush does [m].
         detection_factor: detection threshold in robust standard deviations of the valley image above its median.
         points_per_metre: at most this many points for each metre of coarse line are used for its fit [1/m], evenly thinned.
     """
@@ -34,6 +36,8 @@ class ProfileConfig:
     station_step: Metre = 0.001
     max_side_angle: Radian = 0.30
     max_side_step: Metre = 0.003
+    max_gap: Metre = 0.045
+    max_filled: Metre = 0.025
     detection_factor: float = 4.0
     points_per_metre: float = 100_000.0
 

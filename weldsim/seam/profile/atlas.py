@@ -25,6 +25,7 @@ SURROUNDINGS = 0.042  # [m] points within this of a coarse line take part in its
 MOST_VIEWS = 24  # more than these share one chart
 FEWEST_POINTS = 300  # in a view that has a chart of its own
 GRAZING = 0.15  # cosine to the normal under which a sight line says nothing about a surface
+FACING = 0.5  # cosine to the normal from which on a chart shows whether a surface dips
 STRETCH = 0.010  # [m] of a line over which the same views are used
 FEWEST_IN_STRETCH = 20  # points near such a stretch that a view must have to cover it
 CROSSING = 0.6  # [rad] between the sight lines of two views from which on they cross
@@ -62,6 +63,13 @@ class Atlas:
             if not any(_same(line, other) for other in kept) and len(kept) < MOST_LINES:
                 kept.append(line)
         return kept, threshold
+
+    def facing(self, point: Float[ndarray, "3"], normal: Float[ndarray, "3"]) -> tuple[Chart, ...]:
+        """The charts seen from above the surface at a point [m] with this outward normal."""
+        if len(self.charts) == 1:
+            return self.charts
+        sights = (unit(c.origin - point) if c.perspective else -c.axes[2] for c in self.charts)
+        return tuple(c for c, sight in zip(self.charts, sights, strict=True) if float(sight @ normal) > FACING)
 
     def around(self, line: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], most: int) -> Int[ndarray, "m"]:
         """Indices of the points within SURROUNDINGS of a line, thinned at random to `most`.

@@ -140,6 +140,18 @@ class Chart:
             local = np.stack([a, b, self.depth0 - height], axis=1)
         return self.origin + local @ self.axes
 
+    def heights(self, points: Float[ndarray, "k 3"]) -> tuple[Float[ndarray, "k"], Float[ndarray, "k"]]:
+        """Chart height of points in space [m], and that of the surface seen in the same direction, NaN without data."""
+        local = (points - self.origin) @ self.axes.T
+        z = np.maximum(local[:, 2], 1e-3)
+        uv = local[:, :2] / z[:, None] if self.perspective else local[:, :2]
+        own = self.depth0**2 / z - self.depth0 if self.perspective else self.depth0 - z
+        h, w = self.valid.shape
+        column, row = np.floor((uv - self.corner) / self.step).astype(np.int64).T
+        inside = (column >= 0) & (column < w) & (row >= 0) & (row < h)
+        column, row = np.clip(column, 0, w - 1), np.clip(row, 0, h - 1)
+        return own, np.where(inside & self.valid[row, column], self.height[row, column], np.nan)
+
 
 def make_chart(cloud: PointCloud) -> Chart:
     """The chart of a whole cloud, seen from its (mean) viewpoint or along its thinnest direction."""

@@ -6,9 +6,10 @@ from numpy import ndarray
 
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.parent import CELL
-from weldsim.seam.profile.refine import Fit, pieces, sided
+from weldsim.seam.profile.refine import BRIDGE, Fit, sided
 
 NEAR = 0.014  # [m] beyond the lips' surroundings, over which the plate's edge is read
+SHORTEST_GAP = 0.005  # [m] a shorter stretch unseen is not worth a word
 RUN_OUT = 0.010  # [m] the most an end is carried past the last station whose depth can be trusted
 
 
@@ -19,7 +20,7 @@ def seam_span(fit: Fit, config: ProfileConfig) -> tuple[float, float]:
     groove's. Where the depth fades, the end is where it halves. Where the plate ends, its edge is drawn as a line
     through the last parent surface left and right, and the end is where that line crosses the groove.
     """
-    core = pieces(fit.track.weight > 0, fit.rail.step)[0]
+    core = fit.core
     return _end(fit, core.start, -1), _end(fit, core.stop - 1, +1)
 
 
@@ -79,7 +80,23 @@ def station_mask(fit: Fit, span: tuple[float, float]) -> Bool[ndarray, "m"]:
     return (s >= span[0]) & (s <= span[1])
 
 
-def supported(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> float:
-    """Fraction of the span's stations at which the groove is seen between two parent surfaces."""
+def gaps(fit: Fit, span: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """Stretches of the span (s0, s1) [m] over which no groove was seen, SHORTEST_GAP or longer."""
+    seen = np.flatnonzero((fit.track.weight > 0) & station_mask(fit, span))
+    step = fit.rail.step
+    wide = np.flatnonzero(np.diff(seen) * step >= SHORTEST_GAP)
+    return tuple((float(seen[k] * step), float(seen[k + 1] * step)) for k in wide)
+
+
+def trusted(fit: Fit, span: tuple[float, float]) -> Bool[ndarray, "m"]:
+    """Stations within a span that speak for or against a groove: in a fit of joined pieces, those in no gap."""
     inside = station_mask(fit, span)
+    for s0, s1 in gaps(fit, span) if fit.bridge > BRIDGE else ():
+        inside &= ~station_mask(fit, (s0 + 0.5 * fit.rail.step, s1 - 0.5 * fit.rail.step))
+    return inside
+
+
+def supported(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> float:
+    """Fraction of the span's stations, gaps between joined pieces aside, at which it is seen between two parent surfaces."""
+    inside = trusted(fit, span)
     return float(np.mean((fit.track.weight > 0)[inside] & sided(fit.parent, config)[inside])) if inside.any() else 0.0

@@ -13,16 +13,21 @@ from weldsim.curves import arc_length, interpolate, project, tangents
 from weldsim.frames import unit
 from weldsim.records import PointCloud, Rejection, Seam, SeamFindings
 from weldsim.seam.config import ProfileConfig
-from weldsim.seam.profile.atlas import SURROUNDINGS, Atlas, make_atlas
+from weldsim.seam.profile.atlas import Atlas, make_atlas
+from weldsim.seam.profile.beyond import carry_on
 from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
+from weldsim.seam.profile.grow import grow, uncovered
+from weldsim.seam.profile.join import Piece, gaps, join_pieces
 from weldsim.seam.profile.judge import confidence, refusal
 from weldsim.seam.profile.rail import lay_out
-from weldsim.seam.profile.refine import Fit, pieces, refine
+from weldsim.seam.profile.refine import Fit
+from weldsim.seam.profile.track import deepest
 from weldsim.seam.profile.valley import CoarseLine
 
 LONG = 0.05  # [m] a seam of this length is half as good as the same one without end
 MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
+MOST_REMAINDERS = 3  # times what is left of a coarse line is tried again
 
 
 def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_factor: float = 1.0) -> SeamFindings:
@@ -34,56 +39,65 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     """
     atlas = make_atlas(cloud)
     lines, threshold = atlas.coarse_lines(config, threshold_factor)
-    accepted: list[tuple[Fit, tuple[float, float], float]] = []
-    rejected: list[Rejection] = []
-    for coarse in lines:
-        line = coarse.points
-        if coarse.level < MIN_LEVEL:
-            rejected.append(_rejection(line, f"surface at one level on both sides over only {coarse.level:.0%} of it"))
-            continue
-        if any(_covers(fit, line) for fit, _, _ in accepted):
-            continue
-        fit = _refine_whole(atlas, coarse, config)
-        if fit is None:
-            rejected.append(_rejection(line, "no parent surface on both sides at one level"))
-            continue
-        span = seam_span(fit, config)
-        reason = refusal(fit, span, config)
-        if reason is not None:
-            rejected.append(_rejection(line, reason))
-        elif not any(_covers(other, fit.rail.points[station_mask(fit, span)]) for other, _, _ in accepted):
-            accepted.append((fit, span, confidence(fit, span, config)))
-    accepted.sort(key=_merit, reverse=True)
+    accepted, rejected = _search(atlas, lines, config)
+    sure = {id(piece): confidence(piece.fit, piece.span, config) for piece in accepted}
+    accepted.sort(key=lambda piece: _merit(piece, sure[id(piece)]), reverse=True)
     region = np.zeros(len(cloud), np.int32)
-    for number, (fit, span, _) in enumerate(accepted, start=1):
-        _mark_region(region, number, atlas, fit, span)
-    seams = tuple(_seam(fit, span, sure) for fit, span, sure in accepted)
+    for number, piece in enumerate(accepted, start=1):
+        _mark_region(region, number, atlas, piece.fit, piece.span)
+    seams = tuple(_seam(piece.fit, piece.span, sure[id(piece)]) for piece in accepted)
     return SeamFindings(seams=seams, region=region, rejected=tuple(rejected), threshold=threshold, method="profile")
 
 
-def _refine_whole(atlas: Atlas, coarse: CoarseLine, config: ProfileConfig) -> Fit | None:
-    """The fit of a coarse line; begun again, with the points around, where the groove goes on far beyond the line."""
-    cloud, line, normals = atlas.cloud, coarse.points, coarse.normals
-    fit = None
-    for _ in range(3):
-        most = int(config.points_per_metre * (arc_length(line)[-1] + 2 * SURROUNDINGS))
-        picked = atlas.around(line, normals, most)
-        fit = refine(line, unit(normals.mean(axis=0)), cloud.points[picked], atlas.sight_origins(picked), config)
-        if fit is None:
-            return None
-        core = pieces(fit.track.weight > 0, fit.rail.step)[0]
-        found = fit.rail.points[core]
-        beyond = max(np.linalg.norm(line - end, axis=1).min() for end in (found[0], found[-1]))
-        if beyond < 0.5 * SURROUNDINGS:
-            break
-        line, normals = found, fit.rail.n[core]
-    return fit
+def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tuple[list[Piece], list[Rejection]]:
+    """Seams along coarse lines, those in pieces joined, and what was refused.
+
+    What a seam leaves uncovered of its coarse line is tried again as a line of its own, MOST_REMAINDERS times at most.
+    """
+    found: list[Piece] = []
+    rejected: list[Rejection] = []
+    waiting = [(line.points, line.normals, line.level, MOST_REMAINDERS) for line in coarse]
+    while waiting:
+        line, normals, level, more = waiting.pop(0)
+        whole_line = more == MOST_REMAINDERS
+        if level < MIN_LEVEL:
+            rejected.append(_rejection(line, f"surface at one level on both sides over only {level:.0%} of it"))
+            continue
+        if any(_covers(piece, line) for piece in found):
+            continue
+        fit = grow(atlas, line, normals, config)
+        reason = "no parent surface on both sides at one level"
+        if fit is not None:
+            span = seam_span(fit, config)
+            reason = refusal(fit, span, config)
+            piece = Piece(fit, span, whole=reason is None)
+            if reason is None or refusal(fit, span, config, piece=True) is None:
+                if any(_covers(other, fit.rail.points[station_mask(fit, span)]) for other in found):
+                    continue
+                found.append(piece)
+                if more > 0:
+                    left = uncovered(line, fit, span, 0.8 * config.min_length)
+                    waiting += [(line[part], normals[part], level, more - 1) for part in left]
+        if reason is not None and whole_line:
+            rejected.append(_rejection(line, reason))
+    joined = join_pieces(found, atlas, config)
+    whole = _without_doubles([piece for piece in joined if piece.whole])
+    return _without_doubles([carry_on(piece, atlas, config) for piece in whole]), rejected
 
 
-def _merit(found: tuple[Fit, tuple[float, float], float]) -> float:
+def _without_doubles(pieces: list[Piece]) -> list[Piece]:
+    """The pieces without those that lie along a longer one."""
+    kept: list[Piece] = []
+    for piece in sorted(pieces, key=lambda piece: piece.span[0] - piece.span[1]):
+        if not any(_covers(other, piece.fit.rail.points[station_mask(piece.fit, piece.span)]) for other in kept):
+            kept.append(piece)
+    return kept
+
+
+def _merit(piece: Piece, sure: float) -> float:
     """What puts a seam first: its confidence, and its length as far as more of it is better evidence."""
-    _, (start, end), sure = found
-    return sure * (end - start) / (end - start + LONG)
+    length = piece.span[1] - piece.span[0]
+    return sure * length / (length + LONG)
 
 
 def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:
@@ -93,19 +107,26 @@ def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:
     )
 
 
-def _covers(fit: Fit, line: Float[ndarray, "k 3"]) -> bool:
-    """Whether most of a line lies within an accepted groove."""
-    distance, _, _ = project(line, fit.rail.points)
-    return bool(np.mean(distance < 0.6 * fit.section.width) > 0.5)
+def _covers(piece: Piece, line: Float[ndarray, "k 3"]) -> bool:
+    """Whether most of a line lies within a groove already found."""
+    inside = piece.fit.rail.points[station_mask(piece.fit, piece.span)]
+    distance, _, _ = project(line, inside)
+    return bool(np.mean(distance < 0.6 * piece.fit.section.width) > 0.5)
 
 
 def _mark_region(region: Int[ndarray, "n"], number: int, atlas: Atlas, fit: Fit, span: tuple[float, float]) -> None:
-    """Write `number` at the points whose sight line enters between the lips of a groove."""
+    """Write `number` at the points whose sight line enters between the lips of a groove and ends in it.
+
+    What lies far below its bottom is seen through a root gap; what lies in a gap of the seam lies on a clamp or a tack.
+    """
     part, cloud = station_mask(fit, span), atlas.cloud
     near = atlas.around(fit.rail.points[part], fit.rail.n[part], len(cloud))
     strip = lay_out(fit.rail, cloud.points[near], atlas.sight_origins(near))
     s, x, depth = ray_coordinates(strip, fit.parent)
-    inside: Bool[ndarray, "k"] = (np.abs(x) <= fit.section.width / 2) & (s >= span[0]) & (s <= span[1]) & (depth > -0.004)
+    inside: Bool[ndarray, "k"] = (np.abs(x) <= fit.section.width / 2) & (s >= span[0]) & (s <= span[1])
+    inside &= (depth > -0.004) & (depth < deepest(fit.section))
+    for s0, s1 in gaps(fit, span):
+        inside &= (s <= s0) | (s >= s1)
     region[near[inside]] = number
 
 
@@ -124,9 +145,10 @@ def _seam(fit: Fit, span: tuple[float, float], sure: float) -> Seam:
     left = np.cross(n, t)
     half = fit.section.width / 2
     sigma = np.interp(stations, at, fit.sigma)
+    s = arc_length(points)
     return Seam(
         points_B=points,
-        s=arc_length(points),
+        s=s,
         tangents_B=t,
         normals_B=n,
         left_B=points + half * left,
@@ -136,4 +158,5 @@ def _seam(fit: Fit, span: tuple[float, float], sure: float) -> Seam:
         depth=fit.section.depth,
         residual=fit.parent.noise,
         confidence=sure,
+        gaps=tuple((float(np.interp(s0, stations, s)), float(np.interp(s1, stations, s))) for s0, s1 in gaps(fit, span)),
     )

@@ -3,8 +3,8 @@
 import numpy as np
 
 from weldsim.seam.config import ProfileConfig
-from weldsim.seam.profile.ends import station_mask, supported
-from weldsim.seam.profile.refine import Fit
+from weldsim.seam.profile.ends import station_mask, supported, trusted
+from weldsim.seam.profile.refine import BRIDGE, Fit
 
 MISFIT_LIMIT = 0.75
 MIN_SUPPORT = 0.5
@@ -13,8 +13,12 @@ MIN_STANDING = 9.0
 NOISE_REACH = 0.007  # [m] over which a stereo camera's noise is shared
 
 
-def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> str | None:
-    """Why the candidate is no groove, one clause, or None if it is one."""
+def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: bool = False) -> str | None:
+    """Why the candidate is no groove, one clause, or None if it is one.
+
+    Args:
+        piece: let it be as short as it is: it may be a part of a longer one.
+    """
     section, length = fit.section, span[1] - span[0]
     support = supported(fit, span, config)
     contrast, standing = _contrast(fit), _standing(fit, length)
@@ -25,13 +29,17 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> str |
         (length < 2.0 * section.width, f"{length * 1e3:.1f} mm long, under twice its width of {section.width * 1e3:.1f} mm"),
         (_shown_depth(fit) < config.min_depth, f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {config.min_depth * 1e3:.2f} mm"),
         (fit.track.misfit > MISFIT_LIMIT, f"cross-sections fit a groove poorly ({fit.track.misfit:.2f}, limit {MISFIT_LIMIT})"),
-        (_lapses(fit) > MOST_LAPSES, f"depth comes and goes, absent over {_lapses(fit):.0%} of it: a row of holes, or noise"),
+        (
+            _lapses(fit, span) > MOST_LAPSES,
+            f"depth comes and goes, absent over {_lapses(fit, span):.0%} of it: a row of holes, or noise",
+        ),
         (contrast < 4.0, f"depth is {contrast:.1f} times its own scatter, under 4"),
         (standing < MIN_STANDING, f"depth and length stand {standing:.1f} times over the noise, under {MIN_STANDING:g}"),
         (support < MIN_SUPPORT, f"parent surface on both sides over {support:.0%} of it, under {MIN_SUPPORT:.0%}"),
         (_floor_goes_on(fit, span), "its floor goes on as the surface around it: a gap between two objects on a plate"),
     ]
-    return next((reason for failed, reason in checks if failed), None)
+    by_length = {0, 3, 8} if piece else set()
+    return next((reason for k, (failed, reason) in enumerate(checks) if failed and k not in by_length), None)
 
 
 def confidence(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> float:
@@ -46,11 +54,13 @@ def _shown_depth(fit: Fit) -> float:
     return float(np.max(fit.section.depth_at(fit.grid.x, np.full_like(fit.grid.x, float(np.median(fit.grid.shear))))))
 
 
-def _lapses(fit: Fit) -> float:
+def _lapses(fit: Fit, span: tuple[float, float]) -> float:
     """Fraction of the stations, from the first to the last seen, at which a short look shows hardly any depth."""
     seen = np.flatnonzero(fit.track.weight > 0)
     local = fit.track.local[seen[0] : seen[-1] + 1]
     known = np.isfinite(local)
+    if fit.bridge > BRIDGE:  # what lies across the groove between joined pieces says nothing about them
+        known &= trusted(fit, span)[seen[0] : seen[-1] + 1]
     return float(np.mean(local[known] < 0.4)) if known.any() else 1.0
 
 

@@ -42,13 +42,13 @@ class Parent:
     cells: Float[ndarray, "k 2"]
 
 
-def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float) -> Parent:
-    """The parent surface from points with inner < |x| < outer [m].
+def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float, reach: float | None = None) -> Parent:
+    """The parent surface from points with inner < |x| < outer [m], no higher or lower than `reach` [m] on the rail.
 
     Reweighted least squares (Tukey) from a wide to a narrow scale, so that clamps and the table fall out.
     """
     m = len(rail)
-    band = (np.abs(strip.x) > inner) & (np.abs(strip.x) < outer) & (np.abs(strip.h) < 0.5 * outer + inner)
+    band = (np.abs(strip.x) > inner) & (np.abs(strip.x) < outer) & (np.abs(strip.h) < (reach or 0.5 * outer + inner))
     s, x, h, _ = _cells(strip, band, m * rail.step, outer)
     length = m * rail.step
     knots = max(3, round(length / KNOT) + 1)
@@ -70,8 +70,10 @@ def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float) -> Parent:
     noise = 1.4826 * float(np.median(np.abs(residual[good]))) if good.any() else scale
     at = np.arange(m) * rail.step
     basis, size = _basis(at, length, knots), knots + 2
-    # Curvature across the seam is part of the angle between the sides: it could pass a fold off as a bend.
-    step, angle = _side_difference(s, x, residual + theta[-1] * x**2, np.abs(residual) < 2 * TOLERANCE, m, rail.step)
+    # Curvature across the seam is part of the angle between the sides, as far as neither side bends by itself: it could
+    # pass a fold off as a bend.
+    folded = theta[-1] - _own_curvature(s, x, residual, good, float(theta[-1]))
+    step, angle = _side_difference(s, x, residual + folded * x**2, np.abs(residual) < 2 * TOLERANCE, m, rail.step)
     return Parent(
         a=basis @ theta[:size],
         b=basis @ theta[size : 2 * size],
@@ -172,6 +174,32 @@ def _choose_stiffness(
         errors.append(float(weight @ (h - np.einsum("ij,ij->i", design, theta[fold])) ** 2))
     best = min(errors)
     return max(stiffness for stiffness, error in zip(STIFFNESSES, errors, strict=True) if error <= 1.02 * best)
+
+
+def _own_curvature(
+    s: Float[ndarray, "k"], x: Float[ndarray, "k"], residual: Float[ndarray, "k"], good: Bool[ndarray, "k"], c: float
+) -> float:
+    """The part of the fitted curvature c [1/m] that each side shows within itself, twice its standard deviation off.
+
+    A bend curves both sides; a fold is straight on either side, and all its curvature lies between them.
+    """
+    sign = 1.0 if c >= 0 else -1.0
+    votes, strengths = [], []
+    part = np.floor(s / FOLD).astype(int) * 2 + (x > 0)
+    for label in np.unique(part[good]):
+        here = good & (part == label)
+        if np.count_nonzero(here) < 24:
+            continue
+        y = x[here]
+        shape = y**2 - np.polyval(np.polyfit(y, y**2, 1), y)
+        votes.append(float(shape @ (residual[here] + c * y**2)))
+        strengths.append(float(shape @ shape))
+    if len(votes) < 4:
+        return 0.0
+    strength, each = np.array(strengths), np.array(votes)
+    own = each.sum() / strength.sum()
+    sigma = float(np.sqrt(((each - own * strength) ** 2).sum())) / strength.sum()
+    return sign * float(np.clip(sign * own - 2 * sigma, 0.0, abs(c)))
 
 
 def _height_sigma(s: Float[ndarray, "k"], x: Float[ndarray, "k"], residual: Float[ndarray, "k"]) -> float:

@@ -21,7 +21,11 @@ LOOK = 0.25  # how much of an independent look one cell of such a block is worth
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
 FEWEST_CELLS = 40  # fewer do not fix a cross-section
 MOST_TURNS = 6
+LEVELLING = 2  # turns in which the rail, seen upright at first, is stood on the parent surface
+STEEP = 0.9  # [rad] that the two sides may differ before that
 SETTLED = 2e-4  # [m] a rail that moves less than this is done
+BRIDGE = 0.010  # [m] a groove goes on across this without being seen
+NEAR_RAIL = 0.008  # [m] above and below a rail that lies on the parent surface; a clamp at the end of one is higher
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
 
 
@@ -33,6 +37,7 @@ class Fit:
         inner: half width of the strip about the rail that is kept out of the parent fit [m].
         sigma: (m,) standard deviation of the rail across the seam [m]: of the lateral track with its correlation, of
             the section's middle, and of the parent surface's height, in quadrature.
+        bridge: longest stretch without a groove that does not end it [m].
     """
 
     rail: Rail
@@ -42,6 +47,12 @@ class Fit:
     track: Track
     inner: float
     sigma: Float[ndarray, "m"]
+    bridge: float = BRIDGE
+
+    @property
+    def core(self) -> slice:
+        """The longest stretch of stations at which the groove is seen."""
+        return pieces(self.track.weight > 0, self.rail.step, self.bridge)[0]
 
 
 def refine(
@@ -65,10 +76,12 @@ def refine(
     every, every_origin = points, origins
     stride = max(1, len(points) // FIRST_LOOK)
     points, origins = points[::stride], None if origins is None else origins[::stride]
-    for _ in range(2):
+    for turn in range(LEVELLING):
         strip = lay_out(rail, points, origins)
         parent = fit_parent(rail, strip, inner, outer)
-        if np.count_nonzero(sided(parent, config)) * rail.step < 0.7 * config.min_length:
+        # Sides are at an angle, too, that are bent and seen from a slant; that is told when the rail stands upright.
+        level = sided(parent, config) if turn == LEVELLING - 1 else sided(parent, config, most=STEEP)
+        if np.count_nonzero(level) * rail.step < 0.7 * config.min_length:
             return None
         rail = shift_rail(rail, np.zeros(len(rail)), parent.a, parent.b)
     strip = lay_out(rail, points, origins)
@@ -78,16 +91,45 @@ def refine(
         return None
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
-    measured = _measure(rail, section, every, every_origin, config, first=True)
+    return _settled(_measure(rail, section, every, every_origin, config, first=True), every, every_origin, config, BRIDGE)
+
+
+def resume(
+    line: Float[ndarray, "k 3"],
+    normals: Float[ndarray, "k 3"],
+    section: Section,
+    points: Float[ndarray, "n 3"],
+    origins: Float[ndarray, "n 3"] | None,
+    config: ProfileConfig,
+    bridge: float = BRIDGE,
+) -> Fit | None:
+    """The groove along a line that was fitted before, with other points or together with another piece of it.
+
+    Args:
+        line, normals: (k, 3) of the fitted rail [m].  section: its cross-section.
+        points, origins: as in `refine`.  bridge: longest stretch without a groove that does not end it [m].
+    """
+    rail = make_rail(line, normals, config.station_step, EXTEND)
+    return _settled(_measure(rail, section, points, origins, config), points, origins, config, bridge)
+
+
+def _settled(
+    measured: "Measurement | None",
+    points: Float[ndarray, "n 3"],
+    origins: Float[ndarray, "n 3"] | None,
+    config: ProfileConfig,
+    bridge: float,
+) -> Fit | None:
+    """The fit after as many more turns as the rail needs to come to rest and to stop growing."""
     for _ in range(MOST_TURNS - 1):
         if measured is None:
             return None
         before = measured
-        rail = _advance(before.rail, before.parent, before.section, before.offset, before.track.weight > 0)
-        measured = _measure(rail, before.section, every, every_origin, config)
-        if measured is not None and measured.moved < SETTLED and measured.reach <= before.reach + 2:
+        rail = _advance(before.rail, before.parent, before.section, before.offset, before.track.weight > 0, bridge)
+        measured = _measure(rail, before.section, points, origins, config)
+        if measured is not None and measured.moved < SETTLED and measured.reach(bridge) <= before.reach(bridge) + 2:
             break
-    return None if measured is None else _concluded(measured)
+    return None if measured is None else _concluded(measured, bridge)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +156,9 @@ class Measurement:
         """How far the groove lies from the rail at most [m]."""
         return float(np.abs(self.offset[self.track.weight > 0]).max())
 
-    @property
-    def reach(self) -> int:
-        """Stations in the longest piece seen."""
-        core = pieces(self.track.weight > 0, 1.0, bridge=10.0)[0]
+    def reach(self, bridge: float) -> int:
+        """Stations in the longest piece seen, gaps up to `bridge` [m] bridged."""
+        core = pieces(self.track.weight > 0, self.rail.step, bridge)[0]
         return core.stop - core.start
 
 
@@ -132,7 +173,7 @@ def _measure(
     """Parent surface, section and track along a rail, or None where hardly any groove is seen."""
     strip = lay_out(rail, points, origins)
     inner = 0.5 * start.width + 0.7 * start.blur + 0.001
-    parent = fit_parent(rail, strip, inner, inner + config.side_band)
+    parent = fit_parent(rail, strip, inner, inner + config.side_band, NEAR_RAIL)
     grid = make_grid(rail, strip, parent, 0.5 * start.width + start.blur + 0.006)
     flanked = sided(parent, config)
     section, doubt = _fit_grid(grid, flanked, parent.noise, start, first)
@@ -144,19 +185,19 @@ def _measure(
     return Measurement(rail, parent, grid, section, track, inner, offset, strength, doubt)
 
 
-def _concluded(last: Measurement) -> Fit:
+def _concluded(last: Measurement, bridge: float) -> Fit:
     """The fit: the rail moved onto the smoothed groove, with its standard deviation."""
     lateral = track_deviation(last.track, last.offset, last.strength)
     sigma = np.sqrt(lateral**2 + last.parent.sigma**2 + last.doubt**2)
     height = _opening_height(last.parent, last.section, last.offset)
     rail = shift_rail(last.rail, last.offset, height, _slope(last.parent, last.offset), respace=False)
     track = replace(last.track, offset=last.track.offset - last.offset)
-    return Fit(rail, last.parent, last.grid, last.section, track, last.inner, sigma)
+    return Fit(rail, last.parent, last.grid, last.section, track, last.inner, sigma, bridge)
 
 
-def sided(parent: Parent, config: ProfileConfig) -> Bool[ndarray, "m"]:
-    """Stations with parent surface on both sides, at one level and of one slope."""
-    level = (parent.step < config.max_side_step) & (parent.angle < config.max_side_angle)
+def sided(parent: Parent, config: ProfileConfig, most: float | None = None) -> Bool[ndarray, "m"]:
+    """Stations with parent surface on both sides, at one level and of one slope, within `most` [rad] if given."""
+    level = (parent.step < config.max_side_step) & (parent.angle < (most or config.max_side_angle))
     return level & (parent.support.min(axis=1) > 0.25)
 
 
@@ -184,14 +225,16 @@ def _slope(parent: Parent, offset: Float[ndarray, "m"]) -> Float[ndarray, "m"]:
     return parent.b + 2 * parent.c * offset
 
 
-def _advance(rail: Rail, parent: Parent, section: Section, offset: Float[ndarray, "m"], seen: Bool[ndarray, "m"]) -> Rail:
+def _advance(
+    rail: Rail, parent: Parent, section: Section, offset: Float[ndarray, "m"], seen: Bool[ndarray, "m"], bridge: float = BRIDGE
+) -> Rail:
     """The next rail: moved onto the opening where the groove was seen, and lengthened again at both ends."""
-    core = pieces(seen, rail.step)[0]
+    core = pieces(seen, rail.step, bridge)[0]
     moved = shift_rail(rail, offset, _opening_height(parent, section, offset), _slope(parent, offset), respace=False)
     return make_rail(moved.points[core], moved.n[core], rail.step, EXTEND)
 
 
-def pieces(seen: Bool[ndarray, "m"], step: float, bridge: float = 0.010) -> list[slice]:
+def pieces(seen: Bool[ndarray, "m"], step: float, bridge: float = BRIDGE) -> list[slice]:
     """Stretches of `seen` stations, longest first; gaps up to `bridge` [m] are bridged, specks dropped."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], seen.astype(np.int8), [0]])))
     runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

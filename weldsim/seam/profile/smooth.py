@@ -37,12 +37,15 @@ def _penalty_bands(n: int, strength: float) -> Float[ndarray, "b n"]:
     return bands
 
 
-def smooth(values: Float[ndarray, "n d"], weights: Float[ndarray, "n"], strength: float) -> Float[ndarray, "n d"]:
+def smooth(
+    values: Float[ndarray, "n d"], weights: Float[ndarray, "n"], strength: float, prior: Float[ndarray, "n d"] | None = None
+) -> Float[ndarray, "n d"]:
     """The penalised curve through `values` at evenly spaced stations; stations of weight 0 are bridged.
 
     Args:
         values: (n, d).  weights: (n,) inverse variances, any common scale.
         strength: relative to the mean weight; see STRENGTHS.
+        prior: (n, d) what stations without data are held to, hardly at all; their chord unless given.
     """
     n = len(values)
     if n <= ORDER + 1:
@@ -52,7 +55,10 @@ def smooth(values: Float[ndarray, "n d"], weights: Float[ndarray, "n"], strength
     chord = values[0] + np.linspace(0.0, 1.0, n)[:, None] * (values[-1] - values[0])
     bands = _penalty_bands(n, strength)
     bands[-1] += scaled + FLOOR
-    return chord + solveh_banded(bands, scaled[:, None] * (values - chord), check_finite=False)
+    right = scaled[:, None] * (values - chord)
+    if prior is not None:
+        right += FLOOR * (prior - chord)
+    return chord + solveh_banded(bands, right, check_finite=False)
 
 
 def choose_strength(values: Float[ndarray, "n d"], weights: Float[ndarray, "n"]) -> float:

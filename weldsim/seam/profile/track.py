@@ -14,6 +14,8 @@ from weldsim.seam.profile.smooth import choose_strength, deviation, smooth
 BLOCK = 8  # stations averaged together to judge how well the section fits
 LATERAL_REACH = 3  # stations on either side that share a look at the lateral position: as far as noise is correlated
 AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
+AROUND = 20  # stations on either side over which the density of the cloud is taken as even
+LEAST = 0.1  # of the density of the whole seam that tells anything
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     slope = (section.depth_at(x - delta, shear) - section.depth_at(x + delta, shear)) / (2 * delta)
     # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
     with np.errstate(invalid="ignore"):
-        known = (grid.depth < 1.5 * section.depth + 0.002) & (grid.depth > -0.004)
+        known = (grid.depth < deepest(section)) & (grid.depth > -0.004)
     # Inside the groove a stereo camera is about twice as noisy as on the plate.
     weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
     depth = np.where(known, grid.depth, 0.0)
@@ -57,8 +59,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     each = np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)
     least = round(LATERAL_REACH * grid.sparsity)
     ss, mm, sd, _ = _window_sum(each, least).T
-    full = np.quantile(mm, 0.8)
-    enough = (mm > 0.35 * full) & (ss > 0)
+    enough = (mm > 0.35 * _usual(mm)) & (ss > 0)
     amplitude, local = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
@@ -70,6 +71,11 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
     return Track(shift, weights, amplitude, local, _misfit(np.where(known, depth - model, 0.0), depth, known, seen))
+
+
+def deepest(section: Section) -> float:
+    """Depth [m] below which nothing belongs to a groove."""
+    return 1.5 * section.depth + 0.002
 
 
 def _amplitude(
@@ -86,6 +92,15 @@ def _amplitude(
         if len(core) < 12 or core.std() < 0.22:
             break
     return looks[-1], looks[0]
+
+
+def _usual(mm: Float[ndarray, "m"]) -> Float[ndarray, "m"]:
+    """What the stations around each one hold where nothing is missing: the density of a cloud falls with distance and
+    with the slant at which the camera sees a bent part, so a far end holds less than the middle and is no less there.
+    """
+    padded = np.pad(mm, AROUND, mode="edge")
+    local = np.quantile(np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1), 0.8, axis=1)
+    return np.maximum(local, LEAST * np.quantile(mm, 0.8))
 
 
 def between(seen: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:

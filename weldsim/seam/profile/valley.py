@@ -212,11 +212,15 @@ def _trace(valleys: ValleyImage, config: ProfileConfig) -> list[CoarseLine]:
         column, row = np.rint(line).astype(int).T
         points = chart.to_space(line[:, 0], line[:, 1], valleys.lid[row, column])
         level = _level_sides(chart, line)
-        keep = _longest_run(level, round(0.020 / chart.pitch))
-        if (keep.stop - keep.start) * chart.pitch < 0.6 * config.min_length:
-            keep = slice(0, len(line))  # stays a candidate only to be named among the refused
-        evidence = chart.pitch * float(valleys.lined[row[keep], column[keep]].sum())
-        out.append(CoarseLine(points[keep], _normals(valleys, line[keep]), evidence, float(level[keep].mean())))
+        # A path may lead along one groove, through the moat about the plate, and back along another.
+        runs = [
+            run
+            for run in _runs(level, round(0.020 / chart.pitch))
+            if (run.stop - run.start) * chart.pitch >= 0.6 * config.min_length
+        ]
+        for keep in runs or [slice(0, len(line))]:  # without any it stays a candidate only to be named among the refused
+            evidence = chart.pitch * float(valleys.lined[row[keep], column[keep]].sum())
+            out.append(CoarseLine(points[keep], _normals(valleys, line[keep]), evidence, float(level[keep].mean())))
     return out
 
 
@@ -245,15 +249,14 @@ def _normals(valleys: ValleyImage, line: Float[ndarray, "k 2"]) -> Float[ndarray
     return unit(interpolate(marks.astype(float), np.array(found), np.arange(len(line), dtype=float)))
 
 
-def _longest_run(level: Bool[ndarray, "k"], bridge: int) -> slice:
-    """The longest stretch of true cells, gaps of up to `bridge` cells bridged."""
+def _runs(level: Bool[ndarray, "k"], bridge: int) -> list[slice]:
+    """Stretches of true cells, gaps of up to `bridge` cells bridged."""
     index = np.flatnonzero(level)
     if len(index) == 0:
-        return slice(0, 0)
+        return []
     cuts = np.flatnonzero(np.diff(index) > bridge)
     starts, stops = np.concatenate([[0], cuts + 1]), np.concatenate([cuts, [len(index) - 1]])
-    best = int(np.argmax(index[stops] - index[starts]))
-    return slice(int(index[starts[best]]), int(index[stops[best]]) + 1)
+    return [slice(int(index[a]), int(index[b]) + 1) for a, b in zip(starts, stops, strict=True)]
 
 
 def _level_sides(chart: Chart, line: Float[ndarray, "k 2"]) -> Bool[ndarray, "k"]:

@@ -1,0 +1,168 @@
+"""Whether two ends of grooves are the two banks of one gap, or of one corner, and the line that leads across."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.curves import arc_length
+from weldsim.frames import unit
+
+UNKNOWN_BEND = 4.0  # [1/m] by which a groove's curvature may change unseen
+SLACK = 0.0005  # [m] between two pieces' ends, each fitted by itself
+TURN_SLACK = 0.05  # [rad] between their directions
+SIGMAS = 3.0
+MOST_TURN = 0.5  # [rad] between the carried-on directions, however uncertain they are
+MOST_LEAN = 0.35  # [rad] between the normals of two ends on one surface, not counting what the line itself bends
+DEFAULT_STEP = 0.001  # [m] spacing of a corner's points
+PARALLEL = 0.1  # sine of the angle below which two lines have no corner
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """One end of a fitted groove, looking out of it.
+
+    Attributes:
+        point: (3,) [m].  direction: (3,) unit, outward along the groove.  normal: (3,) unit, outward of the parent surface.
+        bend: (3,) curvature vector with which the groove arrives [1/m].
+        sigma: standard deviation of the point across the seam [m].  turn: of the direction [rad].
+        width, depth: of the groove's section [m].
+    """
+
+    point: Float[ndarray, "3"]
+    direction: Float[ndarray, "3"]
+    normal: Float[ndarray, "3"]
+    bend: Float[ndarray, "3"]
+    sigma: float
+    turn: float
+    width: float
+    depth: float
+
+    def carried(self, d: float) -> tuple[Float[ndarray, "3"], Float[ndarray, "3"]]:
+        """Point [m] and direction a distance d [m] farther out, as the end bends."""
+        return self.point + d * self.direction + 0.5 * d**2 * self.bend, unit(self.direction + d * self.bend)
+
+    def doubt(self, d: float) -> tuple[float, float]:
+        """Standard deviation of that point across the seam [m] and of that direction [rad]."""
+        across = np.hypot(np.hypot(self.sigma, d * self.turn), 0.5 * d**2 * UNKNOWN_BEND)
+        return float(across), float(np.hypot(self.turn, d * UNKNOWN_BEND))
+
+
+@dataclass(frozen=True, eq=False)
+class Corner:
+    """The rounded way from one face to the next.
+
+    Attributes:
+        points: (k, 3) from the end of one groove to that of the other [m].  normals: (k, 3) unit, outward.
+        sigma: (k,) standard deviation of the line [m].
+        corner: (3,) where the two lines, carried on, meet [m].
+    """
+
+    points: Float[ndarray, "k 3"]
+    normals: Float[ndarray, "k 3"]
+    sigma: Float[ndarray, "k"]
+    corner: Float[ndarray, "3"]
+
+
+def alike(a: End, b: End) -> bool:
+    """Whether two ends show sections of one size, as well as a short blurred piece tells."""
+    wide, narrow = max(a.width, b.width), min(a.width, b.width)
+    deep, shallow = max(a.depth, b.depth), min(a.depth, b.depth)
+    return wide - narrow < max(0.3 * wide, 0.002) and shallow > 0.5 * deep
+
+
+def faces(a: End, b: End, max_gap: float) -> bool:
+    """Whether two ends on one surface face each other and, carried on to the middle, meet within their uncertainty.
+
+    Position and direction are tried; the parent surface has to bend no more than its line and MOST_LEAN.
+
+    Args:
+        max_gap: most that may lie between them [m].
+    """
+    chord = b.point - a.point
+    gap = float(np.linalg.norm(chord))
+    if gap > max_gap or float(a.direction @ b.direction) > -0.5:
+        return False
+    if gap > a.width / 4 and min(float(a.direction @ chord), -float(b.direction @ chord)) < 0.5 * gap:
+        return False
+    half = 0.5 * float(np.clip(a.direction @ chord, 0.0, gap))
+    (here, way), (there, back) = a.carried(half), b.carried(half)
+    along = unit(way - back)
+    miss = here - there
+    off = float(np.linalg.norm(miss - (miss @ along) * along))
+    turned = float(np.arccos(np.clip(-way @ back, -1.0, 1.0)))
+    (near, near_turn), (far, far_turn) = a.doubt(half), b.doubt(half)
+    allowed = min(SLACK + SIGMAS * np.hypot(near, far), 0.5 * min(a.width, b.width))
+    may_turn = min(TURN_SLACK + SIGMAS * np.hypot(near_turn, far_turn), MOST_TURN)
+    bends = float(np.arccos(np.clip(-a.direction @ b.direction, -1.0, 1.0)))
+    leans = float(np.arccos(np.clip(a.normal @ b.normal, -1.0, 1.0)))
+    return bool(off < allowed and turned < may_turn and leans < MOST_LEAN + bends)
+
+
+def lead_across(a: End, b: End, step: float) -> tuple[Float[ndarray, "k 3"], Float[ndarray, "k 3"]]:
+    """Points [m] and unit normals of the smooth curve (cubic Hermite) from one end to the other, both left out."""
+    gap = float(np.linalg.norm(b.point - a.point))
+    u = np.linspace(0.0, 1.0, max(2, int(np.ceil(gap / step)) + 1))[1:-1, None]
+    ends = (2 * u**3 - 3 * u**2 + 1) * a.point + (3 * u**2 - 2 * u**3) * b.point
+    ways = (u**3 - 2 * u**2 + u) * a.direction - (u**3 - u**2) * b.direction
+    return ends + gap * ways, unit((1 - u) * a.normal + u * b.normal)
+
+
+def round_corner(a: End, b: End, radius: float, max_gap: float, step: float = DEFAULT_STEP) -> Corner | None:
+    """The way round a convex edge between the faces of two ends, or None where their lines do not meet there.
+
+    Each line goes straight on to the corner; there it is rounded by an arc of `radius` tangent to both, in their plane,
+    its normals turning evenly from one face's to the other's. The standard deviation grows with the distance from the
+    end that each point is carried from.
+
+    Args:
+        radius: of the rounding of the line [m].  max_gap: most that each line is carried on [m].
+        step: most between two points [m].
+    """
+    cross = np.cross(a.direction, b.direction)
+    if float(np.linalg.norm(cross)) < PARALLEL:
+        return None
+    # Convex: either end lies behind the other's face, and the lines run towards each other.
+    chord = b.point - a.point
+    if float(chord @ a.normal) >= 0 or float(chord @ b.normal) <= 0:
+        return None
+    out_a, out_b = np.linalg.lstsq(np.stack([a.direction, -b.direction], axis=1), chord, rcond=None)[0].tolist()
+    if not (0 <= out_a <= max_gap and 0 <= out_b <= max_gap):
+        return None
+    foot_a, foot_b = a.point + out_a * a.direction, b.point + out_b * b.direction
+    near = float(np.hypot(a.sigma, out_a * a.turn))
+    far = float(np.hypot(b.sigma, out_b * b.turn))
+    if float(np.linalg.norm(foot_a - foot_b)) > SLACK + SIGMAS * np.hypot(near, far):
+        return None
+    share = near**2 / max(near**2 + far**2, 1e-18)
+    corner = foot_a + share * (foot_b - foot_a)
+    turn = float(np.arccos(np.clip(-a.direction @ b.direction, -1.0, 1.0)))
+    cut = radius * np.tan(turn / 2)
+    if cut > min(out_a, out_b):
+        return None
+    begin, finish = corner - cut * a.direction, corner - cut * b.direction
+    inward = unit((b.direction @ a.direction) * a.direction - b.direction)
+    angle = np.linspace(0.0, turn, max(2, int(np.ceil(radius * turn / step)) + 1))[:, None]
+    arc = begin + radius * (np.sin(angle) * a.direction + (1 - np.cos(angle)) * inward)
+    points = np.concatenate([_straight(a.point, begin, step), arc, _straight(b.point, finish, step)[::-1]])
+    s = arc_length(points)
+    on_arc = np.clip((s - s[0] - (out_a - cut)) / max(radius * turn, 1e-12), 0.0, 1.0)[:, None]
+    normals = _turned(a.normal, b.normal, on_arc)
+    first, second = np.hypot(a.sigma, s * a.turn), np.hypot(b.sigma, (s[-1] - s) * b.turn)
+    u = on_arc[:, 0]
+    return Corner(points, normals, np.sqrt((1 - u) * first**2 + u * second**2), corner)
+
+
+def _straight(start: Float[ndarray, "3"], stop: Float[ndarray, "3"], step: float) -> Float[ndarray, "k 3"]:
+    """Points from start towards stop, which is left out."""
+    number = max(1, int(np.ceil(np.linalg.norm(stop - start) / step)))
+    return start + np.arange(number)[:, None] / number * (stop - start)
+
+
+def _turned(a: Float[ndarray, "3"], b: Float[ndarray, "3"], u: Float[ndarray, "k 1"]) -> Float[ndarray, "k 3"]:
+    """Unit vectors turned evenly from a (u = 0) to b (u = 1)."""
+    angle = float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
+    if angle < 1e-6:
+        return unit((1 - u) * a + u * b)
+    return (np.sin((1 - u) * angle) * a + np.sin(u * angle) * b) / np.sin(angle)
