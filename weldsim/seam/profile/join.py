@@ -155,8 +155,11 @@ def _sigma_with_gaps(fit: Fit, span: tuple[float, float]) -> Float[ndarray, "m"]
         first, last = round(s0 / step), round(s1 / step)
         inside = np.arange(first, last + 1)
         error = _bridge_error(fit, span, last - first)
-        raised = np.interp((inside - first) / (last - first), np.linspace(0, 1, len(error)), error)
-        sigma[inside] = np.hypot(sigma[inside], raised)
+        u = (inside - first) / (last - first)
+        # Both banks' directions are known from END_REACH of the seam, so the curve between them swings with both.
+        turn = 4 * max(fit.sigma[first], fit.sigma[last]) / END_REACH
+        swing = (s1 - s0) * turn * np.hypot(u * (1 - u) ** 2, u**2 * (1 - u))
+        sigma[inside] = np.sqrt(sigma[inside] ** 2 + np.interp(u, np.linspace(0, 1, len(error)), error) ** 2 + swing**2)
     return sigma
 
 
