@@ -134,6 +134,8 @@ def refit(
     span = seam_span(fit, config)
     if refusal(fit, span, config) is not None:
         return None
+    if any(s1 - s0 > config.max_gap for s0, s1 in gaps(fit, span)):
+        return None
     if any(s1 - s0 > config.max_filled and _plain(fit, s0, s1) for s0, s1 in gaps(fit, span)):
         return None
     return Piece(replace(fit, sigma=_sigma_with_gaps(fit, span)), span, whole=True)
