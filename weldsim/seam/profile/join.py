@@ -181,8 +181,7 @@ def _bridge_error(fit: Fit, span: tuple[float, float], length: int) -> Float[nda
     for begin, stop in runs:
         for first in range(begin, stop - tried, max(tried // 4, 1)):
             last = first + tried
-            ends = [_rail_end(fit, first, 1), _rail_end(fit, last, -1)]
-            line, _ = lead_across(*ends, rail.step)
+            line, _ = lead_across(_rail_end(fit, first, 1), _rail_end(fit, last, -1), rail.step)
             u = np.linspace(0, 1, len(line) + 2)[1:-1]
             true = interpolate(np.linspace(0, 1, tried + 1), rail.points[first : last + 1], u)
             off = line - true
