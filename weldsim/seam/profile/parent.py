@@ -107,8 +107,15 @@ def _cells(strip: Strip, band: Bool[ndarray, "k"], length: float, outer: float) 
 def _basis(s: Float[ndarray, "k"], length: float, knots: int) -> Float[ndarray, "k b"]:
     """Uniform cubic B-splines over [0, length], knots + 2 of them."""
     place = np.clip(s / length, 0.0, 1.0) * (knots - 1)
-    y = np.abs(place[:, None] - np.arange(-1, knots + 1)[None, :])
-    return np.where(y < 1, 2 / 3 - y**2 + y**3 / 2, np.where(y < 2, (2 - y) ** 3 / 6, 0.0))
+    before = np.minimum(place.astype(np.int64), knots - 2)
+    u = place - before
+    r = 1.0 - u
+    out = np.zeros((len(s), knots + 2))
+    index = np.arange(len(s)) * (knots + 2) + before
+    flat = out.reshape(-1)  # only four splines are not zero at a place
+    for k, value in enumerate((r * r * r / 6, 2 / 3 - u * u + u * u * u / 2, 2 / 3 - r * r + r * r * r / 2, u * u * u / 6)):
+        flat[index + k] = value
+    return out
 
 
 def _design(s: Float[ndarray, "k"], x: Float[ndarray, "k"], length: float, knots: int) -> Float[ndarray, "k p"]:

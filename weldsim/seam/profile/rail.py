@@ -101,24 +101,33 @@ def lay_out(rail: Rail, points: Float[ndarray, "k 3"], origins: Float[ndarray, "
         points: (k, 3) [m].  origins: (k, 3) where the camera that saw each point stood, or None.
     """
     station = _nearest(rail, points)
-    offset = points - rail.points[station]
-    along = np.einsum("ij,ij->i", offset, rail.t[station])
+    base = np.take(rail.points, station, axis=0)
+    t = np.take(rail.t, station, axis=0)
+    along = _dot(points - base, t)
     # Axes between stations: without this, a curved rail's points jump by curvature * x * half a step.
     other = np.clip(station + np.where(along > 0, 1, -1), 0, len(rail) - 1)
     u = np.clip(np.abs(along) / rail.step, 0.0, 1.0)[:, None]
-    e = rail.e[station] * (1 - u) + rail.e[other] * u
-    n = rail.n[station] * (1 - u) + rail.n[other] * u
-    base = rail.points[station] * (1 - u) + rail.points[other] * u
+    e, n, base = (_between(axis, station, other, u) for axis in (rail.e, rail.n, rail.points))
     offset = points - base
-    x, h = np.einsum("ij,ij->i", offset, e), np.einsum("ij,ij->i", offset, n)
+    x, h = _dot(offset, e), _dot(offset, n)
     s = station * rail.step + along
     if origins is None:
         return Strip(station, s, x, h, np.zeros((len(points), 2)), np.full(len(points), np.inf))
     sight = unit(points - origins)
-    inward = np.maximum(-np.einsum("ij,ij->i", sight, n), 0.2)
-    slope = np.stack([np.einsum("ij,ij->i", sight, rail.t[station]), np.einsum("ij,ij->i", sight, e)], axis=1) / inward[:, None]
-    above = np.einsum("ij,ij->i", origins - base, n)
-    return Strip(station, s, x, h, slope, above)
+    inward = np.maximum(-_dot(sight, n), 0.2)
+    slope = np.stack([_dot(sight, t), _dot(sight, e)], axis=1) / inward[:, None]
+    return Strip(station, s, x, h, slope, _dot(origins - base, n))
+
+
+def _dot(a: Float[ndarray, "k 3"], b: Float[ndarray, "k 3"]) -> Float[ndarray, "k"]:
+    return np.einsum("ij,ij->i", a, b)
+
+
+def _between(
+    axes: Float[ndarray, "m 3"], one: Int[ndarray, "k"], other: Int[ndarray, "k"], u: Float[ndarray, "k 1"]
+) -> Float[ndarray, "k 3"]:
+    """What lies the part u of the way from one station to the other."""
+    return np.take(axes, one, axis=0) * (1 - u) + np.take(axes, other, axis=0) * u
 
 
 def _nearest(rail: Rail, points: Float[ndarray, "k 3"]) -> Int[ndarray, "k"]:
@@ -136,7 +145,7 @@ def _nearest(rail: Rail, points: Float[ndarray, "k 3"]) -> Int[ndarray, "k"]:
     station = np.rint(guess).astype(np.int64)
     move = np.zeros(len(points), dtype=np.int64)
     for _ in range(4):
-        along = np.einsum("ij,ij->i", points - rail.points[station], rail.t[station])
+        along = _dot(points - np.take(rail.points, station, axis=0), np.take(rail.t, station, axis=0))
         moved = np.clip(station + np.rint(along / rail.step).astype(np.int64), 0, last)
         move, station = moved - station, moved
         if not move.any():

@@ -47,30 +47,36 @@ def smooth(
         strength: relative to the mean weight; see STRENGTHS.
         prior: (n, d) what stations without data are held to, hardly at all; their chord unless given.
     """
-    n = len(values)
+    return _smooth_each(values, weights[None], strength, prior)[0]
+
+
+def _smooth_each(
+    values: Float[ndarray, "n d"], weights: Float[ndarray, "k n"], strength: float, prior: Float[ndarray, "n d"] | None = None
+) -> Float[ndarray, "k n d"]:
+    """The penalised curve for each set of weights, as one system: the last rows of a block do not reach the next one."""
+    k, (n, d) = len(weights), values.shape
     if n <= ORDER + 1:
-        return values.copy()
-    scaled = weights / max(float(weights.mean()), 1e-300)
+        return np.repeat(values[None], k, axis=0)
+    scaled = weights / np.maximum(weights.mean(axis=1, keepdims=True), 1e-300)
     # About the chord, so that the floor that keeps bridged stations well posed pulls towards a straight line.
     chord = values[0] + np.linspace(0.0, 1.0, n)[:, None] * (values[-1] - values[0])
-    bands = _penalty_bands(n, strength)
-    bands[-1] += scaled + FLOOR
-    right = scaled[:, None] * (values - chord)
+    bands = np.tile(_penalty_bands(n, strength), k)
+    bands[-1] += scaled.ravel() + FLOOR
+    right = scaled[..., None] * (values - chord)
     if prior is not None:
         right += FLOOR * (prior - chord)
-    return chord + solveh_banded(bands, right, check_finite=False)
+    return chord + solveh_banded(bands, right.reshape(-1, d), overwrite_ab=True, check_finite=False).reshape(k, n, d)
 
 
 def choose_strength(values: Float[ndarray, "n d"], weights: Float[ndarray, "n"]) -> float:
     """The strength that best predicts blocks of stations left out, the smoother one within one standard error."""
     n = len(values)
     blocks = np.arange(n) // BLOCK
-    folds = [blocks % 4 == k for k in range(4)]
+    folds = np.array([blocks % 4 == k for k in range(4)])
     scores = []
     for strength in STRENGTHS:
         error = np.zeros(n)
-        for fold in folds:
-            predicted = smooth(values, np.where(fold, 0.0, weights), strength)
+        for fold, predicted in zip(folds, _smooth_each(values, np.where(folds, 0.0, weights), strength), strict=True):
             error[fold] = ((predicted - values)[fold] ** 2).sum(axis=1)
         per_block = np.bincount(blocks, weights=error * weights) / np.maximum(np.bincount(blocks, weights=weights), 1e-300)
         scores.append(per_block)
