@@ -1,6 +1,7 @@
 """`weldsim plan` as its users start it: one process a command, files in, files out."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -201,10 +202,32 @@ def test_bad_options_are_refused_before_the_work(scan, tmp_path, monkeypatch, ca
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_reader_that_goes_away_is_no_news(scan):
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("reader", ["true", "head -c 10"])
+def test_a_reader_that_goes_away_is_no_news(scan, reader, unbuffered):
     command = f"{sys.executable} -c 'import sys; from weldsim.cli import main; sys.exit(main())' plan {scan / 'cloud.ply'} --json"
-    done = subprocess.run(["bash", "-c", f"{command} | true; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["bash", "-c", f"{command} | {reader}; exit ${{PIPESTATUS[0]}}"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+    )
     assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_a_home_that_cannot_be_written_is_not_talked_about(scan, tmp_path):
+    (tmp_path / "home").write_text("no folder")
+    home = str(tmp_path / "home")
+    keep = {key: value for key, value in os.environ.items() if key not in ("MPLCONFIGDIR", "XDG_CONFIG_HOME", "XDG_CACHE_HOME")}
+    done = subprocess.run(
+        [sys.executable, "-m", "weldsim", "plan", str(scan / "cloud.ply"), "--report", str(tmp_path / "report.html")],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**keep, "HOME": home},
+    )
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_the_thesis_authors_scan_is_planned(weldsim, real_data):

@@ -5,7 +5,9 @@ WELDSIM_DEBUG=1 its traceback is shown), 130 interrupted, 141 the reader of stdo
 """
 
 import contextlib
+import io
 import json
+import logging
 import os
 import sys
 import traceback
@@ -20,12 +22,15 @@ DEFECT, INTERRUPTED, NO_READER = 70, 130, 141  # sysexits.h EX_SOFTWARE; 128 + S
 
 def main(args: Sequence[str] | None = None) -> int:
     """The exit code of one command; `args` without the program's name, or what the process was started with."""
+    _write_all_of_stdout()
     words = list(sys.argv[1:] if args is None else args)
     debug = os.environ.get("WELDSIM_DEBUG", "") not in ("", "0")
     try:
         with warnings.catch_warnings():
             if not debug:
                 warnings.simplefilter("ignore")  # of libraries; they mean nothing to who runs a command
+                # Where the home folder cannot be written matplotlib takes a temporary one, and would say so.
+                logging.getLogger("matplotlib").setLevel(logging.ERROR)
             code = _dispatch(words)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -62,6 +67,15 @@ def _dispatch(words: list[str]) -> int:
 
     command = parse(words)
     return command if isinstance(command, int) else command()
+
+
+def _write_all_of_stdout() -> None:
+    """Buffers stdout where Python does not (PYTHONUNBUFFERED): unbuffered, it drops without a word what a pipe does not take
+    at once, so that output ends early and a reader who left goes unnoticed."""
+    raw = getattr(sys.stdout, "buffer", None)
+    if isinstance(raw, io.RawIOBase):
+        encoding, errors = sys.stdout.encoding, sys.stdout.errors
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=encoding, errors=errors, line_buffering=True)  # type: ignore[arg-type]
 
 
 def _fail(message: str, code: int, *, as_json: bool) -> int:
