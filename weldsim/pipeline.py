@@ -2,33 +2,30 @@
 
 `look` is its beginning on the twin, `plan` its middle for any cloud, `finish` its end, `run` all three. Perception sees what
 the sensor delivers and nothing else: the known seam is handed to the report alone. Times are taken here and nowhere else.
+What is handed on are the records of `weldsim.jobs`; which stage reads which settings is in `weldsim.config`.
 """
 
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-from jaxtyping import Bool
-from numpy import ndarray
-
+from weldsim.clock import Clock, Tell
 from weldsim.cloud.deproject import deproject
 from weldsim.cloud.files import check_plannable
 from weldsim.cloud.filters import prepare
-from weldsim.cloud.register import Registration
 from weldsim.cloud.views import merge_views
 from weldsim.config import CellConfig, digest
-from weldsim.curves import project
-from weldsim.errors import InputError, PathError
+from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, pick, to_weld, unplanned
 from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.plan import plan_paths
-from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
+from weldsim.records import ExecutionLog, PointCloud, TorchPath
 from weldsim.report.weld import weld_report
+from weldsim.scan.stand import scan
 from weldsim.seam.find import find_seams
-from weldsim.sensor.choose import SensorName, make_sensor, posture, stations
+from weldsim.sensor.base import true_region
+from weldsim.sensor.choose import SensorName, posture
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,152 +34,52 @@ if TYPE_CHECKING:
     from weldsim.scan.tour import Tour
     from weldsim.scene.config import SceneConfig
     from weldsim.scene.world import World
-    from weldsim.sensor.base import Capture
 
-Finder = Callable[[PointCloud], SeamFindings]
-"""A seam finder: a cloud in the robot base in, seams best first out. It may read nothing but the cloud."""
-Tell = Callable[[str, float | None], None]
-"""Told the stage that begins, and while it runs the fraction done, 0 to 1, where that is known."""
-
-
-@dataclass(eq=False)
-class Clock:
-    """Seconds a stage, in order. Attributes: seconds; tell, called when a stage begins."""
-
-    tell: Tell = lambda stage, done: None
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Adds the time its block takes to `seconds[name]`."""
-        self.tell(name, None)
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+__all__ = [
+    "Clock",
+    "Finder",
+    "PlanResult",
+    "RunResult",
+    "SensorName",
+    "Sighting",
+    "Tell",
+    "finish",
+    "look",
+    "pick",
+    "plan",
+    "run",
+    "scan",
+    "true_region",
+    "unplanned",
+]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Sighting:
-    """A scene of the twin as its camera saw it, before anything is concluded from it.
-
-    Attributes:
-        world: the compiled scene.  captures: one a view.  cloud: all views in the base, as perception receives it.
-        registration: how several views were lined up; None for one.
-        tour: how the arm was driven from view to view; None where it was put there.
-        seed, sensor: what it was seen with.  timing: seconds a stage.
-    """
-
-    world: "World"
-    captures: tuple["Capture", ...]
-    cloud: PointCloud
-    registration: Registration | None
-    tour: "Tour | None"
-    seed: int
-    sensor: SensorName
-    timing: dict[str, float]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PlanResult:
-    """What was planned from a cloud. Attributes: cloud, as the seam finder saw it; findings; paths, one for each seam, None
-    where none can be laid; refused, why, by the seam's index; timing, seconds a stage; config_digest."""
-
-    cloud: PointCloud
-    findings: SeamFindings
-    paths: tuple[TorchPath | None, ...]
-    refused: Mapping[int, PathError] = field(default_factory=dict)
-    timing: dict[str, float]
-    config_digest: str
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RunResult:
-    """A whole job on the twin. Attributes: world; captures, one a view; registration, how they were lined up, None for one;
-    tour, how the arm was driven to them, None where it was put there; plan; welded, the index of the seam that was welded;
-    motion and log, None where there was nothing to weld; report."""
-
-    world: "World"
-    captures: tuple["Capture", ...]
-    registration: Registration | None
-    tour: "Tour | None"
-    plan: PlanResult
-    welded: int
-    motion: "MotionPlan | None"
-    log: ExecutionLog | None
-    report: WeldReport
-
-
-def plan(
-    cloud: PointCloud, config: CellConfig | None = None, *, find: Finder | None = None, clock: Clock | None = None
-) -> PlanResult:
-    """Seams of a cloud in the robot base, best first, and a torch path along each; none of either where there is no seam.
-
-    A seam along which no path can be laid is named in `refused` and does not keep the others from being planned.
+def run(
+    scene: "SceneConfig",
+    config: CellConfig | None = None,
+    *,
+    seed: int = 0,
+    sensor: SensorName = "d415",
+    number: int | None = None,
+    near: Sequence[float] | None = None,
+    video: "Path | None" = None,
+    tell: Tell | None = None,
+) -> RunResult:
+    """The twin scans the scene, plans and welds what it found, and is judged against the scene's known seams.
 
     Args:
-        cloud: in B.  config: every stage's settings.
-        find: a seam finder of the caller's own, in place of the one that `config.seam` names.
-        clock: takes the times.
+        scene: what stands on the table.  config: everything else.
+        seed: of the camera's noise.  sensor: which camera looks.
+        number, near: which seam to weld; see `pick`.
+        video: where to write a film of the weld.
+        tell: told of progress.
     Raises:
-        CloudError: a cloud that cannot show a seam.  PathError: the path asked for fits none of the seams.
+        WeldsimError: see the stages; finding no seam is a result, not an error.
     """
-    config, clock = config or CellConfig(), clock or Clock()
-    with clock.stage("cloud"):
-        cloud = prepare(cloud, config.cloud)
-        check_plannable(cloud)
-    with clock.stage("seam"):
-        findings = find_seams(cloud, config.seam) if find is None else find(cloud)
-    with clock.stage("path"):
-        paths, refused = plan_paths(findings.seams, config.path)
-    return PlanResult(
-        cloud=cloud, findings=findings, paths=paths, refused=refused, timing=clock.seconds, config_digest=digest(config)
-    )
-
-
-def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float] | None = None) -> int:
-    """Index of the seam that is meant: the best one, or the `number`-th from 1, or the one nearest to a point in B [m].
-
-    Raises:
-        InputError: a number that no seam has, a point that is not finite.
-    """
-    count = len(findings.seams)
-    if near is not None and not np.isfinite(near).all():
-        raise InputError(f"near {tuple(near)}: three finite numbers in metres are needed", near=tuple(near))
-    if near is not None and count:
-        distances = [project(np.array([near], float), seam.points_B)[0][0] for seam in findings.seams]
-        return int(np.argmin(distances))
-    if number is None:
-        return 0
-    if not 1 <= number <= count:
-        raise InputError(f"seam {number}: {count} found, numbered from 1", seam=number, found=count)
-    return number - 1
-
-
-def scan(world: "World", config: CellConfig, seed: int = 0, sensor: SensorName = "d415") -> tuple["Capture", ...]:
-    """One exposure from each view of the scene, the arm standing where it holds the camera; the Kinect takes one from above.
-
-    The frames say where the camera was meant to stand; where the cell is miscalibrated (`config.twin`, with which the world
-    was built) it stood elsewhere.
-
-    Raises:
-        UnreachableError: a view that the arm cannot take.  SensorError: nothing draws here.
-    """
-    from weldsim.sensor.base import View
-    from weldsim.sensor.exact import twin_scene
-
-    captures = []
-    for index, X_BC in enumerate(stations(world, sensor)):
-        data = world.new_data(posture(world, sensor, index))
-        camera = make_sensor(sensor, twin_scene(world, data), world.intrinsics, config, seed=seed)
-        try:
-            stands = X_BC if sensor == "kinect" else world.camera_pose(index, data)
-            capture = camera.capture(View(X_BC=stands))
-            captures.append(replace(capture, frame=replace(capture.frame, X_BC=X_BC)))
-        finally:
-            camera.close()
-    return tuple(captures)
+    config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
+    seen = look(scene, config, seed=seed, sensor=sensor, move=config.scan.move, clock=clock)
+    result = plan(seen.cloud, config, clock=clock)
+    return finish(seen, result, config, number=number, near=near, video=video, clock=clock)
 
 
 def look(
@@ -232,39 +129,31 @@ def look(
     )
 
 
-def _tour(world: "World", config: CellConfig, seed: int, sensor: SensorName, clock: Clock) -> "Tour":
-    from weldsim.scan.tour import drive
+def plan(
+    cloud: PointCloud, config: CellConfig | None = None, *, find: Finder | None = None, clock: Clock | None = None
+) -> PlanResult:
+    """Seams of a cloud in the robot base, best first, and a torch path along each; none of either where there is no seam.
 
-    tell = partial(clock.tell, "sensor")
-    return drive(world, config, config.motion, config.execution, seed=seed, sensor=sensor, tell=tell)
-
-
-def run(
-    scene: "SceneConfig",
-    config: CellConfig | None = None,
-    *,
-    seed: int = 0,
-    sensor: SensorName = "d415",
-    number: int | None = None,
-    near: Sequence[float] | None = None,
-    video: "Path | None" = None,
-    tell: Tell | None = None,
-) -> RunResult:
-    """The twin scans the scene, plans and welds what it found, and is judged against the scene's known seams.
+    A seam along which no path can be laid is named in `refused` and does not keep the others from being planned.
 
     Args:
-        scene: what stands on the table.  config: everything else.
-        seed: of the camera's noise.  sensor: which camera looks.
-        number, near: which seam to weld; see `pick`.
-        video: where to write a film of the weld.
-        tell: told of progress.
+        cloud: in B.  config: every stage's settings.
+        find: a seam finder of the caller's own, in place of the one that `config.seam` names.
+        clock: takes the times.
     Raises:
-        WeldsimError: see the stages; finding no seam is a result, not an error.
+        CloudError: a cloud that cannot show a seam.  PathError: the path asked for fits none of the seams.
     """
-    config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
-    seen = look(scene, config, seed=seed, sensor=sensor, move=config.scan.move, clock=clock)
-    result = plan(seen.cloud, config, clock=clock)
-    return finish(seen, result, config, number=number, near=near, video=video, clock=clock)
+    config, clock = config or CellConfig(), clock or Clock()
+    with clock.stage("cloud"):
+        cloud = prepare(cloud, config.cloud)
+        check_plannable(cloud)
+    with clock.stage("seam"):
+        findings = find_seams(cloud, config.seam) if find is None else find(cloud)
+    with clock.stage("path"):
+        paths, refused = plan_paths(findings.seams, config.path)
+    return PlanResult(
+        cloud=cloud, findings=findings, paths=paths, refused=refused, timing=clock.seconds, config_digest=digest(config)
+    )
 
 
 def finish(
@@ -290,7 +179,7 @@ def finish(
         PathError: the seam that is meant has no path.
     """
     clock, world = clock or Clock(), seen.world
-    welded, path = _to_weld(result, number, near)
+    welded, path = to_weld(result, number, near)
     motion, log = _weld(seen, path, config, clock, video) if execute and path is not None else (None, None)
     with clock.stage("report"):
         report = weld_report(
@@ -321,27 +210,6 @@ def finish(
     )
 
 
-def unplanned(result: PlanResult) -> tuple[str, ...]:
-    """A clause for each seam that has no path: its number from 1 and why."""
-    return tuple(f"seam {index + 1} has no path: {error}" for index, error in result.refused.items())
-
-
-def _to_weld(result: PlanResult, number: int | None, near: Sequence[float] | None) -> tuple[int, TorchPath | None]:
-    """Index and path of the seam that is meant, by default the best that has a path; (0, None) where there is no seam.
-
-    Raises:
-        InputError: a number that no seam has.  PathError: the seam that is meant has no path.
-    """
-    if not result.paths:
-        return 0, None
-    if number is None and near is None:
-        return next((index, path) for index, path in enumerate(result.paths) if path is not None)
-    index = pick(result.findings, number, near)
-    if index in result.refused:
-        raise PathError(f"seam {index + 1}: {result.refused[index]}", **result.refused[index].data)
-    return index, result.paths[index]
-
-
 def _weld(
     seen: Sighting, path: TorchPath, config: CellConfig, clock: Clock, video: "Path | None"
 ) -> tuple["MotionPlan", ExecutionLog]:
@@ -366,17 +234,8 @@ def _weld(
     return motion, log
 
 
-def true_region(captures: tuple["Capture", ...], kept: PointCloud) -> Bool[ndarray, "n"] | None:
-    """For each point kept, whether its pixel shows a groove; None where points do not know their pixels (a voxel grid)."""
-    from weldsim.sensor.base import Label
+def _tour(world: "World", config: CellConfig, seed: int, sensor: SensorName, clock: Clock) -> "Tour":
+    from weldsim.scan.tour import drive
 
-    masks = []
-    for capture in captures:
-        if capture.truth is None:
-            return None
-        masks.append(capture.truth.labels.reshape(-1) == Label.GROOVE)
-    if kept.pixel is None:
-        return None
-    if kept.view is None:
-        return masks[0][kept.pixel] if len(masks) == 1 else None
-    return np.stack(masks)[kept.view, kept.pixel]
+    tell = partial(clock.tell, "sensor")
+    return drive(world, config, config.motion, config.execution, seed=seed, sensor=sensor, tell=tell)

@@ -5,7 +5,7 @@ accept "12 mm" where a `Metre` stands. In memory every quantity is SI.
 """
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, get_args, get_type_hints
 
 from weldsim.errors import ConfigError
 
@@ -21,6 +21,9 @@ Pixel = Annotated[float, "px"]
 def require_within(config: object, ranges: Mapping[str, tuple[float, float]], table: str = "") -> None:
     """Nothing, when every named field of `config` lies in its range, ends included; SI.
 
+    A range is wide: it holds whatever could be meant, and keeps out what would run for ever, fill the memory or be no number
+    of use, a figure in millimetres or degrees written without its unit above all.
+
     Raises:
         ConfigError: one that does not; `data`: key, value, limit.
     """
@@ -28,4 +31,7 @@ def require_within(config: object, ranges: Mapping[str, tuple[float, float]], ta
         value = getattr(config, name)
         if not low <= value <= high:
             key = f"{table}.{name}".lstrip(".")
-            raise ConfigError(f"{key} = {value:g} is outside {low:g} to {high:g}", key=key, value=value, limit=(low, high))
+            unit = "".join(f" {name}" for name in get_args(get_type_hints(type(config), include_extras=True)[name])[1:2])
+            raise ConfigError(
+                f"{key} = {value:g}{unit} is outside {low:g} to {high:g}{unit}", key=key, value=value, limit=(low, high)
+            )

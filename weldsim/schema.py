@@ -244,9 +244,19 @@ def _faults(error: BaseException, path: str) -> Iterable[tuple[str, dict[str, An
         dotted = f"{path}.{error.args[0]}".lstrip(".") if not path.endswith(str(error.args[0])) else path
         yield f"key {dotted!r} is missing", {"key": dotted}
     else:
-        data = dict(getattr(error, "data", {}))
-        data["key"] = f"{path}.{data['key']}".lstrip(".") if "key" in data else path
-        yield lead + str(error).removeprefix("value: "), data
+        data, text = dict(getattr(error, "data", {})), str(error).removeprefix("value: ")
+        data["key"] = _under(path, str(data["key"])) if "key" in data else path
+        named = re.match(r"([\w.]+)(?=:| = )", text)
+        if named and data["key"].endswith(named[1]) and _under(path, named[1]) == data["key"]:  # it names itself
+            lead, text = "", data["key"] + text[named.end() :]
+        yield lead + text, data
+
+
+def _under(path: str, key: str) -> str:
+    """The dotted path of `key` in the table at `path`; what of the path it repeats is not said twice."""
+    tables, own = path.split("."), key.split(".")
+    shared = next((n for n in range(len(own) - 1, 0, -1) if tables[-n:] == own[:n]), 0)
+    return ".".join([*tables, *own[shared:]]).lstrip(".")
 
 
 def _make_converter() -> Converter:

@@ -73,7 +73,7 @@ def _write_all_of_stdout() -> None:
     """Buffers stdout where Python does not (PYTHONUNBUFFERED): unbuffered, it drops without a word what a pipe does not take
     at once, so that output ends early and a reader who left goes unnoticed."""
     raw = getattr(sys.stdout, "buffer", None)
-    if isinstance(raw, io.RawIOBase):
+    if isinstance(raw, io.RawIOBase) and sys.stdout is sys.__stdout__:  # not one that a caller put in its place
         encoding, errors = sys.stdout.encoding, sys.stdout.errors
         sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=encoding, errors=errors, line_buffering=True)  # type: ignore[arg-type]
 

@@ -3,7 +3,21 @@
 from dataclasses import dataclass, field
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import Metre, Radian, require_within
+
+RANGES = {
+    "voxel": (0.0, 0.1),
+    "outlier_radius": (0.0, 0.1),
+    "outlier_neighbours": (1, 10_000),
+}
+REGISTER_RANGES = {
+    "offset_sigma": (1e-6, 0.1),
+    "view_sigma": (1e-6, 0.1),
+    "view_turn": (1e-6, 0.5),
+    "hand_eye_sigma": (1e-6, 0.1),
+    "hand_eye_turn": (1e-6, 0.5),
+    "farthest": (0.05, 10.0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,9 +50,7 @@ class RegisterConfig:
     """Whether, where two views still show one surface in two places, the worse-seen one is dropped."""
 
     def __post_init__(self) -> None:
-        for name in ("offset_sigma", "view_sigma", "view_turn", "hand_eye_sigma", "hand_eye_turn", "farthest"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"cloud.register.{name} = {getattr(self, name):g}: must be positive", key=name)
+        require_within(self, REGISTER_RANGES, "cloud.register")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +82,4 @@ class CloudConfig:
             for axis, low, high in zip("xyz", self.crop_min, self.crop_max, strict=True):
                 if low >= high:
                     raise ConfigError(f"crop box: {axis} from {low:g} m to {high:g} m holds nothing", key="crop_max", axis=axis)
-        for name in ("voxel", "outlier_radius"):
-            if getattr(self, name) < 0:
-                raise ConfigError(f"{name} = {getattr(self, name):g} m is negative; 0 switches it off", key=name)
-        if self.outlier_neighbours < 1:
-            raise ConfigError(f"outlier_neighbours = {self.outlier_neighbours}; at least 1 is needed", key="outlier_neighbours")
+        require_within(self, RANGES, "cloud")

@@ -5,6 +5,19 @@ from dataclasses import dataclass, field
 from weldsim.errors import ConfigError
 from weldsim.quantity import Radian, Second, require_within
 
+RANGES = {
+    "start_tolerance": (1e-6, 1.0),
+    "settle": (0.0, 60.0),
+}
+SIMULATION_RANGES = {
+    "period": (5e-4, 0.1),
+    "timestep": (1e-5, 0.1),
+    "velocity_lag": (0.0, 0.1),
+    "payload_known": (0.0, 2.0),
+    "stop_deceleration": (0.01, 1e4),
+    "frame_period": (1e-3, 60.0),
+}
+
 
 @dataclass(frozen=True)
 class SimulationConfig:
@@ -24,17 +37,12 @@ class SimulationConfig:
     """Simulated time between two calls of the frame callback."""
 
     def __post_init__(self) -> None:
-        for name in ("period", "timestep", "stop_deceleration", "frame_period"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"simulation.{name} = {getattr(self, name)}: must be positive", key=f"simulation.{name}")
-        require_within(self, {"period": (5e-4, 0.1), "timestep": (1e-5, 0.1), "stop_deceleration": (0.01, 1e4)}, "simulation")
+        require_within(self, SIMULATION_RANGES, "simulation")
         if self.timestep > min(self.period, 0.002):
             raise ConfigError(
                 f"simulation.timestep = {self.timestep} s: at most {min(self.period, 0.002)} s, or the servos turn unstable",
                 key="simulation.timestep",
             )
-        if not 0.0 <= self.payload_known <= 2.0:
-            raise ConfigError(f"simulation.payload_known = {self.payload_known}: expected 0 to 2", key="simulation.payload_known")
 
 
 @dataclass(frozen=True)
@@ -49,8 +57,4 @@ class ExecutionConfig:
     """How the simulated arm behaves."""
 
     def __post_init__(self) -> None:
-        if not self.start_tolerance > 0 or self.settle < 0:
-            raise ConfigError(
-                "execution: start_tolerance must be positive and settle not negative", key="execution.start_tolerance"
-            )
-        require_within(self, {"settle": (0.0, 60.0)}, "execution")
+        require_within(self, RANGES, "execution")

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from weldsim.errors import ConfigError
 from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre, RadianPerSecond, Second, require_within
 
 # Beyond these a plan takes for ever, or has more samples than memory, without being of use to any arm.
@@ -22,8 +21,11 @@ RANGES = {
     "spline_tolerance": (1e-8, 0.01),
     "position_tolerance": (1e-8, 0.01),
     "axis_tolerance": (1e-8, 1.0),
+    "joint_rate": (1.0, 1e5),
     "rolls": (1, 3600),
     "candidates": (1, 1000),
+    "floor": (-2.0, 2.0),
+    "clearance": (0.0, 1.0),
 }
 
 
@@ -75,14 +77,4 @@ class MotionConfig:
     """Whether the arm goes back to where it started."""
 
     def __post_init__(self) -> None:
-        positive = (
-            "period lead_speed tip_acceleration tip_jerk joint_speed joint_acceleration joint_jerk joint_speed_limit"
-            " joint_acceleration_limit grid spline_tolerance position_tolerance axis_tolerance joint_rate rolls candidates"
-        )
-        for name in positive.split():
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"motion.{name} = {getattr(self, name)}: must be positive", key=f"motion.{name}")
         require_within(self, RANGES, "motion")
-        for name in ("approach", "limit_margin", "clearance"):
-            if getattr(self, name) < 0:
-                raise ConfigError(f"motion.{name} = {getattr(self, name)}: must not be negative", key=f"motion.{name}")

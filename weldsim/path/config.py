@@ -7,6 +7,16 @@ from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre, requ
 
 DEGREE_PER_MM: RadianPerMetre = 17.453292519943295  # 1 deg/mm
 STEEPEST: Radian = 1.0471975511965976  # 60 deg
+RANGES = {
+    "step": (1e-5, 0.01),
+    "speed": (1e-4, 1.0),
+    "smoothing": (0.0, 1.0),
+    "turn_limit": (1e-3, 1e6),
+    "ctwd": (1e-3, 0.1),
+    "nominal_ctwd": (1e-3, 0.1),
+    "start_trim": (0.0, 10.0),
+    "end_trim": (0.0, 10.0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,15 +63,7 @@ class PathConfig:
     """Whether the arm may turn the torch about its wire."""
 
     def __post_init__(self) -> None:
-        for name in ("step", "speed", "turn_limit", "ctwd", "nominal_ctwd"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} = {getattr(self, name):g} must be positive", key=name, value=getattr(self, name))
-        require_within(self, {"ctwd": (1e-3, 0.1), "nominal_ctwd": (1e-3, 0.1), "speed": (1e-4, 1.0)})
-        for name in ("smoothing", "start_trim", "end_trim"):
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"{name} = {getattr(self, name):g} m must not be negative", key=name, value=getattr(self, name))
-        if self.step < 1e-5:
-            raise ConfigError(f"step = {self.step:g} m; 0.01 mm is the least", key="step", value=self.step)
+        require_within(self, RANGES, "path")
         for name in ("work_angle", "travel_angle"):
             if not abs(getattr(self, name)) <= STEEPEST:
                 raise ConfigError(

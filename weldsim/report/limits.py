@@ -4,10 +4,17 @@ import math
 from dataclasses import dataclass
 
 from weldsim import units
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import Metre, Radian, require_within
 from weldsim.records import LineError, WeldReport
 
 DEGREE = math.pi / 180
+RANGES = {  # below 0, or over all of the seam, nothing passes
+    **dict.fromkeys(("mean", "p95", "max", "tracking"), (-1.0, 1.0)),
+    **dict.fromkeys(("axis_median", "axis_p95"), (-3.15, 3.15)),
+    "coverage": (-1.0, 2.0),
+    "speed": (-1.0, 100.0),
+    "phantoms": (-1, 1000),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +39,9 @@ class ReportConfig:
     """95th percentile of the relative torch speed error on the weld, outside the ramps."""
     phantoms: int = 0
     """Seams found where there is none."""
+
+    def __post_init__(self) -> None:
+        require_within(self, RANGES, "report")
 
 
 @dataclass(frozen=True, kw_only=True)

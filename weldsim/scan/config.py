@@ -4,7 +4,17 @@ from dataclasses import dataclass
 from typing import Literal
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import Metre, Radian, require_within
+
+RANGES = {
+    "nearest": (0.05, 5.0),
+    "farthest": (0.05, 5.0),
+    "incidence": (0.01, 1.5),
+    "margin": (0.0, 0.4),
+    "coverage": (0.01, 1.0),
+    "surroundings": (1e-3, 0.5),
+    "most": (1, 64),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,16 +49,6 @@ class ScanConfig:
     """Greatest number of views."""
 
     def __post_init__(self) -> None:
-        if not 0 < self.nearest < self.farthest:
-            raise ConfigError(
-                f"scan: nearest {self.nearest:g} m and farthest {self.farthest:g} m; the first must be positive and less",
-                key="nearest",
-            )
-        if not 0 < self.incidence < 1.5:
-            raise ConfigError(f"scan.incidence = {self.incidence:g} rad: expected over 0 and under 1.5", key="incidence")
-        if not 0 <= self.margin < 0.4:
-            raise ConfigError(f"scan.margin = {self.margin:g}: expected 0 to 0.4", key="margin")
-        if not 0 < self.coverage <= 1:
-            raise ConfigError(f"scan.coverage = {self.coverage:g}: expected over 0, at most 1", key="coverage")
-        if not self.surroundings > 0 or self.most < 1:
-            raise ConfigError("scan: surroundings must be positive and most at least 1", key="surroundings")
+        require_within(self, RANGES, "scan")
+        if not self.nearest < self.farthest:
+            raise ConfigError(f"scan.nearest = {self.nearest:g} m: must be under farthest, {self.farthest:g} m", key="nearest")

@@ -7,8 +7,8 @@ import numpy as np
 
 from weldsim.errors import SceneError
 from weldsim.frames import Transform, matrix_from_rotation_vector
-from weldsim.quantity import Metre, Radian
-from weldsim.scene.views import CameraPoseConfig, ViewConfig
+from weldsim.quantity import Metre, Radian, require_within
+from weldsim.scene.views import REACH, TURN, CameraPoseConfig, ViewConfig
 from weldsim.scene.workpieces.base import Workpiece
 from weldsim.scene.workpieces.branches import BranchesConfig, make_branched_plate
 from weldsim.scene.workpieces.centre_line import CentreLineConfig
@@ -54,6 +54,10 @@ class PartPoseConfig:
     yaw: Radian = 0.0
     tilt: Radian = 0.0
     tilt_heading: Radian = 0.0
+
+    def __post_init__(self) -> None:
+        ranges = {"x": REACH, "y": REACH, "clearance": REACH, "yaw": TURN, "tilt": TURN, "tilt_heading": TURN}
+        require_within(self, ranges if self.z is None else {**ranges, "z": REACH}, "pose")
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from weldsim.errors import SceneError
+from weldsim.errors import ConfigError, SceneError
 from weldsim.frames import Transform, matrix_from_rotation_vector
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import Metre, Radian, require_within
 
+REACH, TURN = (-3.0, 3.0), (-2 * np.pi, 2 * np.pi)  # [m], [rad] a bare number beyond was meant as millimetres or degrees
 WIDEST = float(np.radians(120))  # tilt of a view: sides are seen level, or a little from below
 
 
@@ -26,6 +27,14 @@ class CameraPoseConfig:
     y: Metre
     z: Metre
     quaternion_wxyz: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_within(self, dict.fromkeys("xyz", REACH), "camera_in_base")
+        length = float(np.linalg.norm(self.quaternion_wxyz))
+        if not 0.99 <= length <= 1.01:
+            raise ConfigError(
+                f"camera_in_base.quaternion_wxyz has length {length:g}; a rotation's is 1", key="quaternion_wxyz", value=length
+            )
 
 
 @dataclass(frozen=True)
@@ -51,6 +60,10 @@ class ViewConfig:
     shift_y: Metre = 0.0
     shift_z: Metre = 0.0
     camera_in_base: CameraPoseConfig | None = None
+
+    def __post_init__(self) -> None:
+        shifts = dict.fromkeys(("shift_x", "shift_y", "shift_z"), REACH)
+        require_within(self, {"tilt": TURN, "heading": TURN, "roll": TURN, "standoff": (0.0, REACH[1]), **shifts}, "view")
 
     def pose(self, X_BP: Transform) -> Transform:
         """X_BC, for a part at X_BP.

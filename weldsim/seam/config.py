@@ -3,8 +3,25 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from weldsim.quantity import Metre, Radian
+from weldsim.errors import ConfigError
+from weldsim.quantity import Metre, Radian, require_within
 from weldsim.seam.thesis.config import ThesisConfig
+
+RANGES = {
+    "min_width": (5e-4, 0.1),
+    "max_width": (1e-3, 0.2),
+    "min_length": (1e-3, 10.0),
+    "min_depth": (0.0, 0.1),
+    "search_width": (2e-3, 0.4),
+    "side_band": (2e-3, 0.2),
+    "station_step": (1e-4, 0.02),
+    "max_side_angle": (0.01, 1.5),
+    "max_side_step": (0.0, 0.1),
+    "max_gap": (0.0, 0.5),
+    "max_filled": (0.0, 0.5),
+    "detection_factor": (0.1, 1000.0),
+    "points_per_metre": (1e3, 1e6),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +57,16 @@ class ProfileConfig:
     max_filled: Metre = 0.025
     detection_factor: float = 4.0
     points_per_metre: float = 100_000.0
+
+    def __post_init__(self) -> None:
+        require_within(self, RANGES, "seam.profile")
+        for low, high in (("min_width", "max_width"), ("max_width", "search_width")):
+            if not getattr(self, low) < getattr(self, high):
+                raise ConfigError(
+                    f"seam.profile.{high} = {getattr(self, high):g} m: must be over {low}, {getattr(self, low):g} m",
+                    key=high,
+                    limit=getattr(self, low),
+                )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float32, UInt8
 from numpy import ndarray
 
 from weldsim.errors import RecordError
 from weldsim.frames import Transform, read_only
-from weldsim.records import CameraIntrinsics, DepthFrame
+from weldsim.records import CameraIntrinsics, DepthFrame, PointCloud
 
 
 class Label(IntEnum):
@@ -88,6 +88,20 @@ class Capture:
 
     frame: DepthFrame
     truth: Truth | None = None
+
+
+def true_region(captures: tuple[Capture, ...], kept: PointCloud) -> Bool[ndarray, "n"] | None:
+    """For each point kept, whether its pixel shows a groove; None where points do not know their pixels (a voxel grid)."""
+    masks = []
+    for capture in captures:
+        if capture.truth is None:
+            return None
+        masks.append(capture.truth.labels.reshape(-1) == Label.GROOVE)
+    if kept.pixel is None:
+        return None
+    if kept.view is None:
+        return masks[0][kept.pixel] if len(masks) == 1 else None
+    return np.stack(masks)[kept.view, kept.pixel]
 
 
 class DepthSensor(ABC):

@@ -16,7 +16,7 @@ from numpy import ndarray
 from scipy.special import ndtri
 
 from weldsim.errors import ConfigError, RecordError
-from weldsim.quantity import Metre, Pixel
+from weldsim.quantity import Metre, Pixel, require_within
 from weldsim.records import CameraIntrinsics
 from weldsim.sensor.base import Finish
 from weldsim.sensor.disparity import correlated_field, hidden_from_right, jitter_edges, near_edges, patches, support_average
@@ -38,6 +38,26 @@ _HOLES_BELOW = ndtri(np.array([DROPOUT[finish] for finish in Finish])).astype(np
 HOLE_SIZE = 12.0  # [px] correlation length of the holes on shiny or black surfaces
 FOCAL_SPREAD, BASELINE_SPREAD = 0.015, 0.3e-3  # [1], [m] between units of a make, either way; both known to the camera
 FARTHEST = 3.0  # [px] below this disparity (11 m at 640 x 480) the camera reports nothing
+
+RANGES = {
+    "focal_scale": (0.2, 5.0),
+    "baseline": (1e-3, 1.0),
+    "disparity_sigma": (0.0, 10.0),
+    "correlation": (0.1, 50.0),
+    "window": (1, 101),
+    "relief_gain": (0.0, 100.0),
+    "relief_limit": (1e-3, 100.0),
+    "pixel_locking": (-1.0, 1.0),
+    "disparity_step": (0.0, 16.0),
+    "depth_unit": (0.0, 0.1),
+    "max_disparity": (4.0, 1000.0),
+    "temporal_fraction": (0.0, 1.0),
+    "offset_sigma": (0.0, 0.5),
+    "offset_limit": (0.0, 0.5),
+    "edge_step": (0.01, 1000.0),
+    "edge_jitter": (0.0, 50.0),
+    "edge_dropout": (0.0, 1.0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,24 +128,7 @@ class D415Config:
     def __post_init__(self) -> None:
         if self.window % 2 == 0:  # it would shift the image by half a pixel
             raise ConfigError(f"sensor.window: {self.window} must be odd", key="window", value=self.window)
-        positive = ("focal_scale", "baseline", "correlation", "window", "relief_limit", "max_disparity", "edge_step")
-        for name in positive:
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"sensor.{name}: {getattr(self, name)} must be positive", key=name, value=getattr(self, name))
-        for name in (
-            "disparity_sigma",
-            "relief_gain",
-            "disparity_step",
-            "depth_unit",
-            "offset_sigma",
-            "offset_limit",
-            "edge_jitter",
-        ):
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"sensor.{name}: {getattr(self, name)} must not be negative", key=name, value=getattr(self, name))
-        for name in ("temporal_fraction", "edge_dropout"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ConfigError(f"sensor.{name}: {getattr(self, name)} is outside 0 to 1", key=name, value=getattr(self, name))
+        require_within(self, RANGES, "sensor")
 
 
 def d415(

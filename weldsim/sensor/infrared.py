@@ -13,8 +13,7 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 from numpy import ndarray
 
-from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, Pixel, Radian
+from weldsim.quantity import Metre, Pixel, Radian, require_within
 from weldsim.sensor.base import Finish
 from weldsim.sensor.disparity import correlated_field
 from weldsim.sensor.renderer import dot, lengths
@@ -31,6 +30,22 @@ which flatters brushed steel."""
 TEXELS = 1400.0  # [px] focal length of the pattern's image: a dot's deviation is then 1.8 texels
 REFERENCE = 0.4  # [m] distance at which the laser lights as strongly as `laser` says
 DOTS_AT_FOCAL = 925.0  # [px] focal length at which `dot_sigma` is stated
+
+RANGES = {
+    "dots": (100, 1_000_000),
+    "dot_sigma": (0.1, 20.0),
+    "projector_width": (0.05, 2.1),
+    "projector_height": (0.05, 2.1),
+    "projector_x": (-0.5, 0.5),
+    "lens_sigma": (0.0, 20.0),
+    "speckle": (0.0, 2.0),
+    "speckle_size": (0.05, 20.0),
+    "ambient": (0.0, 100.0),
+    "exposure": (1.0, 255.0),
+    "most_gain": (0.01, 1e4),
+    "electrons": (0.01, 1e6),
+    "read_noise": (0.0, 100.0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,14 +80,7 @@ class InfraredConfig:
     """Standard deviation of read noise [DN]."""
 
     def __post_init__(self) -> None:
-        size = ("dots", "dot_sigma", "projector_width", "projector_height", "speckle_size")
-        for name in (*size, "exposure", "most_gain", "electrons"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"infrared.{name}: {getattr(self, name)} must be positive", key=name, value=getattr(self, name))
-        for name in ("lens_sigma", "speckle", "ambient", "read_noise"):
-            value = getattr(self, name)
-            if not value >= 0:
-                raise ConfigError(f"infrared.{name}: {value} must not be negative", key=name, value=value)
+        require_within(self, RANGES, "infrared")
 
 
 @lru_cache(maxsize=4)

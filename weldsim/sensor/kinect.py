@@ -14,13 +14,29 @@ from jaxtyping import Bool, Complex64, Float, Float32
 from numpy import ndarray
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, Pixel
+from weldsim.quantity import Metre, Pixel, require_within
 
 LIGHT = 299792458.0  # [m/s]
 FREQUENCIES = (16e6, 80e6, 120e6)  # [Hz] assumed; three are used, the lowest without ambiguity up to 9.4 m
 SMOOTHING = np.array([0.107, 0.113, 0.107, 0.113, 0.120, 0.113, 0.107, 0.113, 0.107], np.float32)  # libfreenect2's default
 ALIKE = 0.03  # [m] neighbours within this are smoothed together
 GRAZING = np.radians(85.0)  # the noise law has a pole at 90 deg: angles are cut off here
+
+RANGES = {
+    "blur": (0.0, 20.0),
+    "noise": (0.0, 100.0),
+    "offset": (-1.0, 1.0),
+    "wiggling": (0.0, 1.0),
+    "wiggling_period": (0.01, 10.0),
+    "bounces": (0, 256),
+    "edge_near": (1e-4, 10.0),
+    "edge_far": (1e-4, 10.0),
+    "edge_alone": (1e-4, 10.0),
+    "edge_count": (0, 9),
+    "nearest": (0.01, 9.4),
+    "farthest": (0.02, 9.4),
+    "depth_unit": (0.0, 0.1),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +77,7 @@ class KinectConfig:
     """Depth is stored in these steps; 0 = exact."""
 
     def __post_init__(self) -> None:
-        for name in ("wiggling_period", "nearest", "farthest", "edge_near", "edge_far", "edge_alone"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"kinect.{name}: {getattr(self, name)} must be positive", key=name, value=getattr(self, name))
-        for name in ("blur", "noise", "wiggling", "bounces", "depth_unit"):
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"kinect.{name}: {getattr(self, name)} must not be negative", key=name, value=getattr(self, name))
+        require_within(self, RANGES, "kinect")
         if not self.nearest < self.farthest:
             raise ConfigError(
                 f"kinect.farthest: {self.farthest} m is not beyond nearest, {self.nearest} m", key="farthest", value=self.farthest

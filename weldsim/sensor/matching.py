@@ -12,10 +12,21 @@ from jaxtyping import Float32, UInt8
 from numpy import ndarray
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Pixel
+from weldsim.quantity import Pixel, require_within
 
 SEARCH = 128  # [px] searched, and the width of the border added on the left: OpenCV gives nothing in that many columns
 SGBM_BLOCK = 7  # [px]
+
+RANGES = {
+    "window": (3, 51),
+    "blur": (0.0, 20.0),
+    "iterations": (1, 50),
+    "most_step": (0.01, 64.0),
+    "least_correlation": (0.0, 0.999),
+    "least_contrast": (0.0, 255.0),
+    "uniqueness": (0, 100),
+    "least_island": (0, 10_000),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,13 +51,9 @@ class MatchingConfig:
     """Islands of disparity smaller than this are removed, before and after the fractions are found [px2]."""
 
     def __post_init__(self) -> None:
-        if self.window < 3 or self.window % 2 == 0:
-            raise ConfigError(f"matching.window: {self.window} must be odd and 3 or more", key="window", value=self.window)
-        if self.iterations < 1:
-            raise ConfigError(f"matching.iterations: {self.iterations} must be 1 or more", key="iterations", value=self.iterations)
-        if not 0 <= self.least_correlation < 1:
-            value = self.least_correlation
-            raise ConfigError(f"matching.least_correlation: {value} must be 0 to 1", key="least_correlation", value=value)
+        require_within(self, RANGES, "matching")
+        if self.window % 2 == 0:
+            raise ConfigError(f"matching.window: {self.window} must be odd", key="window", value=self.window)
 
 
 def match(left: UInt8[ndarray, "h w"], right: UInt8[ndarray, "h w"], config: MatchingConfig) -> Float32[ndarray, "h w"]:

@@ -2,10 +2,18 @@
 
 from dataclasses import dataclass, field
 
-from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, Pixel
+from weldsim.quantity import Metre, Pixel, require_within
 from weldsim.sensor.infrared import InfraredConfig
 from weldsim.sensor.matching import MatchingConfig
+
+RANGES = {
+    "baseline": (1e-3, 1.0),
+    "disparity_step": (0.0, 16.0),
+    "depth_unit": (0.0, 0.1),
+    "max_disparity": (4.0, 1000.0),
+    "offset_sigma": (0.0, 0.5),
+    "offset_limit": (0.0, 0.5),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,9 +38,4 @@ class D415StereoConfig:
     """That error is cut off at this share of the distance (the maker's accuracy figure)."""
 
     def __post_init__(self) -> None:
-        for name in ("baseline", "max_disparity"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"stereo.{name}: {getattr(self, name)} must be positive", key=name, value=getattr(self, name))
-        for name in ("disparity_step", "depth_unit", "offset_sigma", "offset_limit"):
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"stereo.{name}: {getattr(self, name)} must not be negative", key=name, value=getattr(self, name))
+        require_within(self, RANGES, "stereo")

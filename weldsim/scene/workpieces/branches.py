@@ -171,10 +171,16 @@ def make_branched_plate(plate: PlateConfig, groove: GrooveConfig, shape: Branche
         if not np.radians(40) <= shape.spread <= np.radians(170):
             limit = (np.radians(40), np.radians(170))
             raise SceneError(f"branches: spread {np.degrees(shape.spread):g} deg must be 40 to 170 deg", key="spread", limit=limit)
+    if abs(shape.junction) >= plate.length / 2:
+        raise SceneError(
+            f"branches: junction {shape.junction * 1e3:g} mm from the plate's middle lies off the plate,"
+            f" {plate.length * 1e3:g} mm long; move the junction or make the plate longer",
+            key="junction",
+            limit=plate.length / 2,
+        )
     for name, start, end in part.ends():
         length = float((end - start) @ (part.directions()[0] * -1.0)) if "arm" not in name else float(np.linalg.norm(end - start))
-        inside = abs(shape.junction) < plate.length / 2
-        if length < 2 * section.width or not inside:
+        if length < 2 * section.width:
             raise SceneError(
                 f"branches: {name} is {max(length, 0.0) * 1e3:.0f} mm long, at least {section.width * 2e3:g} mm (twice the groove's"
                 " width) is needed; move the junction, or make the plate larger, the groove narrower or its margin smaller",

@@ -11,6 +11,9 @@ from numpy import ndarray
 from weldsim.errors import SceneError
 from weldsim.quantity import Metre
 
+RADII, WAVELENGTHS = (1e-3, 100.0), (0.01, 100.0)  # [m]
+FARTHEST = 2.0  # [m] of the line from the plate's middle: no plate is larger
+
 
 @dataclass(frozen=True)
 class CentreLineConfig:
@@ -133,12 +136,20 @@ def make_centre_line(config: CentreLineConfig, length: float) -> CentreLine:
     """The centre line over a plate of `length` [m] along x, an arc placed so that it is centred on `offset`.
 
     Raises:
-        SceneError: a radius or wavelength that is not positive, or an arc too tight to span the plate.
+        SceneError: a radius or wavelength outside RADII or WAVELENGTHS, or an arc too tight to span the plate.
     """
+    if abs(config.offset) > FARTHEST:
+        raise SceneError(
+            f"centre line: offset {config.offset * 1e3:g} mm must be at most {FARTHEST * 1e3:g} mm", key="offset", limit=FARTHEST
+        )
     if config.shape == "straight":
         return StraightLine(config.offset)
-    if config.radius <= 0:
-        raise SceneError(f"centre line: radius {config.radius * 1e3:g} mm must be positive", key="radius", limit=0.0)
+    for key, limits in (("radius", RADII), ("wavelength", WAVELENGTHS)):
+        value, (low, high) = getattr(config, key), limits
+        if (key == "radius" or config.shape == "s") and not low <= value <= high:
+            raise SceneError(
+                f"centre line: {key} {value * 1e3:g} mm must be {low * 1e3:g} to {high * 1e3:g} mm", key=key, limit=limits
+            )
     if config.shape == "arc":
         if config.radius <= length / 2:
             raise SceneError(
@@ -149,6 +160,4 @@ def make_centre_line(config: CentreLineConfig, length: float) -> CentreLine:
             )
         lowest = np.sqrt(config.radius**2 - (length / 2) ** 2)
         return CircularArc(config.radius, config.offset - (config.radius + lowest) / 2)
-    if config.wavelength <= 0:
-        raise SceneError(f"centre line: wavelength {config.wavelength * 1e3:g} mm must be positive", key="wavelength", limit=0.0)
     return SineLine((config.wavelength / (2 * np.pi)) ** 2 / config.radius, config.wavelength, config.offset)

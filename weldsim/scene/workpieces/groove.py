@@ -9,6 +9,8 @@ from numpy import ndarray
 from weldsim.errors import SceneError
 from weldsim.quantity import Metre, Radian
 
+SIZES = (0.2e-3, 0.5)  # [m] of what can be called a groove in a part
+
 
 @dataclass(frozen=True)
 class GrooveConfig:
@@ -80,13 +82,14 @@ def make_section(config: GrooveConfig) -> GrooveSection:
     """The cross-section that `config` describes.
 
     Raises:
-        SceneError: a size that is not positive, an angle too wide for the width at this depth, a root gap wider than the
+        SceneError: a width or depth outside SIZES, an angle too wide for the width at this depth, a root gap wider than the
             groove or given beside an angle, a misalignment that leaves no groove on the lower side.
     """
     for key in ("width", "depth"):
         value = getattr(config, key)
-        if value <= 0:
-            raise SceneError(f"groove: {key} {value * 1e3:g} mm must be positive", key=key, limit=0.0)
+        if not SIZES[0] <= value <= SIZES[1]:
+            low, high = (limit * 1e3 for limit in SIZES)
+            raise SceneError(f"groove: {key} {value * 1e3:g} mm must be {low:g} to {high:g} mm", key=key, limit=SIZES)
     if config.margin < 0:
         raise SceneError(f"groove: margin {config.margin * 1e3:g} mm must not be negative", key="margin", limit=0.0)
     step = config.misalignment

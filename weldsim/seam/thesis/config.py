@@ -3,20 +3,41 @@
 "thesis" = printed in chapter 5; "code" = read off the author's published program; "ours" = neither says.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from weldsim.errors import ConfigError
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import Metre, Radian, require_within
 
 Descriptor = Literal["thesis", "code"]
+
+RANGES = {
+    "voxel": (1e-4, 0.05),
+    "mls_radius": (0.0, 0.1),
+    "normal_radius": (2e-4, 0.1),
+    "descriptor_radius": (2e-4, 0.1),
+    "cluster_radius": (2e-4, 0.1),
+    "cluster_size": (1, 10_000_000),
+    "boundary_normal_radius": (2e-4, 0.1),
+    "boundary_radius": (2e-4, 0.1),
+    "boundary_angle": (0.01, 6.3),
+    "partner_start": (1e-4, 0.1),
+    "partner_limit": (1e-4, 1.0),
+    "partner_angle": (1e-3, 1.6),
+    "thin_radius": (2e-4, 0.1),
+    "thin_passes": (1, 10_000),
+    "thin_voxel": (1e-4, 0.1),
+    "order_radius": (2e-4, 1.0),
+    "end_cut": (0, 10_000),
+    "axis_radius": (2e-4, 0.5),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class ThesisConfig:
-    """Settings of `find_seams_thesis`. Raises ConfigError for a radius or count that is not positive."""
+    """Settings of `find_seams_thesis`. Raises ConfigError for a radius or count outside its range."""
 
     voxel: Metre = 0.001
     """Edge of the cubes whose points are averaged before anything else (code)."""
@@ -83,10 +104,6 @@ class ThesisConfig:
     uses a ball of 0.1 m)."""
 
     def __post_init__(self) -> None:
-        may_be_zero = {"mls_radius", "end_cut"}
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, str) or value is None:
-                continue
-            if not np.isfinite(value) or value < 0 or (value == 0 and field.name not in may_be_zero):
-                raise ConfigError(f"{field.name} = {value:g} must be positive", key=field.name, value=value)
+        require_within(self, RANGES, "thesis")
+        if self.threshold is not None and not self.threshold > 0:
+            raise ConfigError(f"thesis.threshold = {self.threshold:g}: must be positive", key="threshold", value=self.threshold)

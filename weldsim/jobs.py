@@ -1,0 +1,113 @@
+"""What a job leaves behind: a scene as it was seen, what was planned on it, and what came of that. And which seam is meant."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from weldsim.cloud.register import Registration
+from weldsim.curves import project
+from weldsim.errors import InputError, PathError
+from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
+from weldsim.sensor.choose import SensorName
+
+if TYPE_CHECKING:
+    from weldsim.motion.plan import MotionPlan
+    from weldsim.scan.tour import Tour
+    from weldsim.scene.world import World
+    from weldsim.sensor.base import Capture
+
+Finder = Callable[[PointCloud], SeamFindings]
+"""A seam finder: a cloud in the robot base in, seams best first out. It may read nothing but the cloud."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sighting:
+    """A scene of the twin as its camera saw it, before anything is concluded from it.
+
+    Attributes:
+        world: the compiled scene.  captures: one a view.  cloud: all views in the base, as perception receives it.
+        registration: how several views were lined up; None for one.
+        tour: how the arm was driven from view to view; None where it was put there.
+        seed, sensor: what it was seen with.  timing: seconds a stage.
+    """
+
+    world: "World"
+    captures: tuple["Capture", ...]
+    cloud: PointCloud
+    registration: Registration | None
+    tour: "Tour | None"
+    seed: int
+    sensor: SensorName
+    timing: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlanResult:
+    """What was planned from a cloud. Attributes: cloud, as the seam finder saw it; findings; paths, one for each seam, None
+    where none can be laid; refused, why, by the seam's index; timing, seconds a stage; config_digest."""
+
+    cloud: PointCloud
+    findings: SeamFindings
+    paths: tuple[TorchPath | None, ...]
+    refused: Mapping[int, PathError] = field(default_factory=dict)
+    timing: dict[str, float]
+    config_digest: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunResult:
+    """A whole job on the twin. Attributes: world; captures, one a view; registration, how they were lined up, None for one;
+    tour, how the arm was driven to them, None where it was put there; plan; welded, the index of the seam that was welded;
+    motion and log, None where there was nothing to weld; report."""
+
+    world: "World"
+    captures: tuple["Capture", ...]
+    registration: Registration | None
+    tour: "Tour | None"
+    plan: PlanResult
+    welded: int
+    motion: "MotionPlan | None"
+    log: ExecutionLog | None
+    report: WeldReport
+
+
+def unplanned(result: PlanResult) -> tuple[str, ...]:
+    """A clause for each seam that has no path: its number from 1 and why."""
+    return tuple(f"seam {index + 1} has no path: {error}" for index, error in result.refused.items())
+
+
+def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float] | None = None) -> int:
+    """Index of the seam that is meant: the best one, or the `number`-th from 1, or the one nearest to a point in B [m].
+
+    Raises:
+        InputError: a number that no seam has, a point that is not finite.
+    """
+    count = len(findings.seams)
+    if near is not None and not np.isfinite(near).all():
+        raise InputError(f"near {tuple(near)}: three finite numbers in metres are needed", near=tuple(near))
+    if near is not None and count:
+        distances = [project(np.array([near], float), seam.points_B)[0][0] for seam in findings.seams]
+        return int(np.argmin(distances))
+    if number is None:
+        return 0
+    if not 1 <= number <= count:
+        raise InputError(f"seam {number}: {count} found, numbered from 1", seam=number, found=count)
+    return number - 1
+
+
+def to_weld(result: PlanResult, number: int | None, near: Sequence[float] | None) -> tuple[int, TorchPath | None]:
+    """Index and path of the seam that is meant, by default the best that has a path; (0, None) where there is no seam.
+
+    Raises:
+        InputError: a number that no seam has.  PathError: the seam that is meant has no path.
+    """
+    if not result.paths:
+        return 0, None
+    if number is None and near is None:
+        return next((index, path) for index, path in enumerate(result.paths) if path is not None)
+    index = pick(result.findings, number, near)
+    if index in result.refused:
+        raise PathError(f"seam {index + 1}: {result.refused[index]}", **result.refused[index].data)
+    return index, result.paths[index]
