@@ -40,6 +40,8 @@ class ProfileConfig:
         max_side_step: largest height difference between them at the groove [m].
         max_gap: pieces of one groove with no more than this between them are joined, past a clamp or missing data [m].
         max_filled: no more than this of it may show the plate's own surface, as a tack weld filed flush does [m].
+        corner_radius: with which a seam that goes on round an edge of the part is rounded there [m]; at a right angle the line
+            then passes 0.29 of it inside of the faces.
         detection_factor: detection threshold in robust standard deviations of the valley image above its median.
         points_per_metre: at most this many points for each metre of coarse line are used for its fit [1/m], evenly thinned.
     """
@@ -55,6 +57,7 @@ class ProfileConfig:
     max_side_step: Metre = 0.003
     max_gap: Metre = 0.045
     max_filled: Metre = 0.025
+    corner_radius: Metre = 0.005
     detection_factor: float = 4.0
     points_per_metre: float = 100_000.0
 

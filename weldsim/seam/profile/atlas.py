@@ -94,6 +94,11 @@ class Atlas:
         rank = np.random.default_rng(0).random(len(self.cloud))[index]
         return index[np.sort(np.argpartition(rank, most)[:most])]
 
+    def within_reach(self, line: Float[ndarray, "k 3"]) -> Int[ndarray, "m"]:
+        """Indices of all points, of whatever view, that may lie within SURROUNDINGS of a line (k, 3) [m], and of some more."""
+        low, high = line.min(axis=0) - SURROUNDINGS, line.max(axis=0) + SURROUNDINGS
+        return np.flatnonzero(((self.cloud.points > low) & (self.cloud.points < high)).all(axis=1))
+
     def sight_origins(self, index: Int[ndarray, "m"]) -> Float[ndarray, "m 3"] | None:
         """Where the cameras stood that saw these points (m, 3) [m], or None where unknown."""
         origins = self.cloud.sight_origins()

@@ -9,12 +9,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from weldsim.curves import arc_length, interpolate, project, tangents
-from weldsim.frames import unit
-from weldsim.records import PointCloud, Rejection, Seam, SeamFindings
+from weldsim.curves import arc_length, project
+from weldsim.records import PointCloud, Rejection, SeamFindings
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.atlas import Atlas, make_atlas
 from weldsim.seam.profile.beyond import carry_on
+from weldsim.seam.profile.corners import lay_courses
+from weldsim.seam.profile.course import Course, to_seam
 from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.grow import grow, uncovered
@@ -40,12 +41,13 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     atlas = make_atlas(cloud)
     lines, threshold = atlas.coarse_lines(config, threshold_factor)
     accepted, rejected = _search(atlas, lines, config)
-    sure = {id(piece): confidence(piece.fit, piece.span, config) for piece in accepted}
-    accepted.sort(key=lambda piece: _merit(piece, sure[id(piece)]), reverse=True)
+    found = [(course, _confidence(course, config)) for course in lay_courses(accepted, config)]
+    found.sort(key=lambda each: _merit(*each), reverse=True)
     region = np.zeros(len(cloud), np.int32)
-    for number, piece in enumerate(accepted, start=1):
-        _mark_region(region, number, atlas, piece.fit, piece.span)
-    seams = tuple(_seam(piece.fit, piece.span, sure[id(piece)]) for piece in accepted)
+    for number, (course, _) in enumerate(found, start=1):
+        for piece in course.pieces:
+            _mark_region(region, number, atlas, piece.fit, piece.span)
+    seams = tuple(to_seam(course, sure) for course, sure in found)
     return SeamFindings(seams=seams, region=region, rejected=tuple(rejected), threshold=threshold, method="profile")
 
 
@@ -94,10 +96,15 @@ def _without_doubles(pieces: list[Piece]) -> list[Piece]:
     return kept
 
 
-def _merit(piece: Piece, sure: float) -> float:
+def _confidence(course: Course, config: ProfileConfig) -> float:
+    """That of the pieces, weighted by their lengths."""
+    length = [piece.span[1] - piece.span[0] for piece in course.pieces]
+    return float(np.average([confidence(piece.fit, piece.span, config) for piece in course.pieces], weights=length))
+
+
+def _merit(course: Course, sure: float) -> float:
     """What puts a seam first: its confidence, and its length as far as more of it is better evidence."""
-    length = piece.span[1] - piece.span[0]
-    return sure * length / (length + LONG)
+    return sure * course.length / (course.length + LONG)
 
 
 def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:
@@ -120,7 +127,7 @@ def _mark_region(region: Int[ndarray, "n"], number: int, atlas: Atlas, fit: Fit,
     What lies far below its bottom is seen through a root gap; what lies in a gap of the seam lies on a clamp or a tack.
     """
     part, cloud = station_mask(fit, span), atlas.cloud
-    near = atlas.around(fit.rail.points[part], fit.rail.n[part], len(cloud))
+    near = atlas.within_reach(fit.rail.points[part])
     strip = lay_out(fit.rail, cloud.points[near], atlas.sight_origins(near))
     s, x, depth = ray_coordinates(strip, fit.parent)
     inside: Bool[ndarray, "k"] = (np.abs(x) <= fit.section.width / 2) & (s >= span[0]) & (s <= span[1])
@@ -128,35 +135,3 @@ def _mark_region(region: Int[ndarray, "n"], number: int, atlas: Atlas, fit: Fit,
     for s0, s1 in gaps(fit, span):
         inside &= (s <= s0) | (s >= s1)
     region[near[inside]] = number
-
-
-def _seam(fit: Fit, span: tuple[float, float], sure: float) -> Seam:
-    """The seam record: the rail between its ends, lips on the parent surface."""
-    rail, step = fit.rail, fit.rail.step
-    at = np.arange(len(rail)) * step
-    stations = np.concatenate([[span[0]], at[(at > span[0] + 0.3 * step) & (at < span[1] - 0.3 * step)], [span[1]]])
-
-    points = interpolate(at, rail.points, stations)
-    for end in (0, -1):  # beyond the rail's own last station: straight on
-        points[end] += (stations[end] - np.clip(stations[end], at[0], at[-1])) * rail.t[end]
-    t = tangents(points)
-    n = unit(interpolate(at, rail.n, stations))
-    n = unit(n - np.einsum("ij,ij->i", n, t)[:, None] * t)
-    left = np.cross(n, t)
-    half = fit.section.width / 2
-    sigma = np.interp(stations, at, fit.sigma)
-    s = arc_length(points)
-    return Seam(
-        points_B=points,
-        s=s,
-        tangents_B=t,
-        normals_B=n,
-        left_B=points + half * left,
-        right_B=points - half * left,
-        sigma=sigma,
-        width=fit.section.width,
-        depth=fit.section.depth,
-        residual=fit.parent.noise,
-        confidence=sure,
-        gaps=tuple((float(np.interp(s0, stations, s)), float(np.interp(s1, stations, s))) for s0, s1 in gaps(fit, span)),
-    )

@@ -16,6 +16,8 @@ SIGMAS = 3.0
 MOST_TURN = 0.5  # [rad] between the carried-on directions, however uncertain they are
 MOST_LEAN = 0.35  # [rad] between the normals of two ends on one surface, not counting what the line itself bends
 DEFAULT_STEP = 0.001  # [m] spacing of a corner's points
+MOST_MISS = 0.25  # of the width, by which lines may miss each other at an edge: each face has its own view, seen from elsewhere
+LEAST_EDGE = 0.25  # [rad] between two faces; less is a bend or a warp of one
 PARALLEL = 0.1  # sine of the angle below which two lines have no corner
 
 
@@ -63,6 +65,10 @@ class Corner:
     normals: Float[ndarray, "k 3"]
     sigma: Float[ndarray, "k"]
     corner: Float[ndarray, "3"]
+
+    def reversed(self) -> "Corner":
+        """The same way, travelled from the second groove to the first."""
+        return Corner(self.points[::-1], self.normals[::-1], self.sigma[::-1], self.corner)
 
 
 def alike(a: End, b: End) -> bool:
@@ -123,6 +129,8 @@ def round_corner(a: End, b: End, radius: float, max_gap: float, step: float = DE
     cross = np.cross(a.direction, b.direction)
     if float(np.linalg.norm(cross)) < PARALLEL:
         return None
+    if float(a.normal @ b.normal) > np.cos(LEAST_EDGE):
+        return None
     # Convex: either end lies behind the other's face, and the lines run towards each other.
     chord = b.point - a.point
     if float(chord @ a.normal) >= 0 or float(chord @ b.normal) <= 0:
@@ -133,7 +141,8 @@ def round_corner(a: End, b: End, radius: float, max_gap: float, step: float = DE
     foot_a, foot_b = a.point + out_a * a.direction, b.point + out_b * b.direction
     near = float(np.hypot(a.sigma, out_a * a.turn))
     far = float(np.hypot(b.sigma, out_b * b.turn))
-    if float(np.linalg.norm(foot_a - foot_b)) > SLACK + SIGMAS * np.hypot(near, far):
+    allowed = max(SLACK + SIGMAS * float(np.hypot(near, far)), MOST_MISS * min(a.width, b.width))
+    if float(np.linalg.norm(foot_a - foot_b)) > allowed:
         return None
     share = near**2 / max(near**2 + far**2, 1e-18)
     corner = foot_a + share * (foot_b - foot_a)
@@ -152,6 +161,23 @@ def round_corner(a: End, b: End, radius: float, max_gap: float, step: float = DE
     first, second = np.hypot(a.sigma, s * a.turn), np.hypot(b.sigma, (s[-1] - s) * b.turn)
     u = on_arc[:, 0]
     return Corner(points, normals, np.sqrt((1 - u) * first**2 + u * second**2), corner)
+
+
+def meeting_point(ends: list[End]) -> Float[ndarray, "3"] | None:
+    """The point [m] that the lines of several ends on one surface pass through, each straight on, or None where one of them
+    misses it by more than MOST_MISS of its width, or faces another way."""
+    if min(float(a.normal @ b.normal) for a in ends for b in ends) < np.cos(MOST_LEAN):
+        return None
+    across = [(np.eye(3) - np.outer(end.direction, end.direction)) / end.sigma**2 for end in ends]
+    total = np.sum(across, axis=0)
+    if np.linalg.cond(total) > 1e3:
+        return None
+    point = np.linalg.solve(total, np.sum([each @ end.point for each, end in zip(across, ends, strict=True)], axis=0))
+    for end in ends:
+        way = point - end.point
+        if float(np.linalg.norm(way - (way @ end.direction) * end.direction)) > MOST_MISS * end.width or way @ end.direction < 0:
+            return None
+    return point
 
 
 def _straight(start: Float[ndarray, "3"], stop: Float[ndarray, "3"], step: float) -> Float[ndarray, "k 3"]:

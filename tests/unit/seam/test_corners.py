@@ -1,0 +1,77 @@
+"""Seams that go on round the edges of a box come out as one; branches end where they meet; a stopped groove does not."""
+
+import numpy as np
+import pytest
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.curves import project
+from weldsim.records import PointCloud, Seam
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.find import find_seams_profile
+
+CONFIG = ProfileConfig()
+HALF, WIDTH, DEPTH, SPACING = 0.10, 0.014, 0.008, 0.0014
+EDGE = 0.0005  # [m] by which points keep away from an edge
+
+
+def face(rng: np.random.Generator, long: float, wide: float, stop: float = 0.0, noise: float = 1e-4) -> Float[ndarray, "n 3"]:
+    """A face in z = 0, x from -long to 0, with a V-groove along y = 0 that stops at x = -stop."""
+    x, y = np.meshgrid(np.arange(-long, -EDGE, SPACING), np.arange(-wide, wide, SPACING), indexing="ij")
+    x, y = x.ravel() + rng.uniform(-3e-4, 3e-4, x.size), y.ravel() + rng.uniform(-3e-4, 3e-4, x.size)
+    groove = np.maximum(0.0, 1 - np.abs(y) / (WIDTH / 2)) * DEPTH * (x < -stop)
+    return np.stack([np.minimum(x, 0.0), y, -groove + rng.normal(0, noise, x.size)], axis=1)
+
+
+def edge_cloud(angle: float, rng: np.random.Generator, stop: float = 0.0, viewpoints: bool = True) -> PointCloud:
+    """Two faces that meet at x = z = 0, the second turned down by `angle` [rad], each seen from its own side."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.array([[-c, 0, s], [0, -1, 0], [s, 0, c]])  # half a turn about the vertical, then down
+    first, second = face(rng, 0.12, 0.06, stop), face(rng, 0.10, 0.06, stop) @ R.T
+    points = np.concatenate([first, second])
+    if not viewpoints:
+        return PointCloud(points=points)
+    eyes = np.array([[-0.06, 0.02, 0.4], R @ np.array([-0.05, 0.02, 0.4])])
+    return PointCloud(points=points, viewpoints=eyes, view=np.repeat([0, 1], [len(first), len(second)]))
+
+
+def truth(angle: float) -> Float[ndarray, "3 3"]:
+    return np.array([[-0.12, 0, 0], [0, 0, 0], [0.10 * np.cos(angle), 0, -0.10 * np.sin(angle)]])
+
+
+def turns(seam: Seam) -> Float[ndarray, "n-1"]:
+    """Angle from each direction to the next [rad]."""
+    return np.arccos(np.clip((seam.tangents_B[1:] * seam.tangents_B[:-1]).sum(1), -1, 1))
+
+
+@pytest.mark.parametrize(("seed", "angle", "viewpoints"), [(0, np.pi / 2, True), (1, 1.2, True), (2, np.pi / 2, False)])
+def test_a_seam_goes_on_round_an_edge(seed: int, angle: float, viewpoints: bool) -> None:
+    found = find_seams_profile(edge_cloud(angle, np.random.default_rng(seed), viewpoints=viewpoints), CONFIG)
+    assert len(found.seams) == 1
+    seam = found.seams[0]
+    distance, _, _ = project(seam.points_B, truth(angle))
+    radius = CONFIG.corner_radius
+    assert np.quantile(distance, 0.9) < 3e-4
+    assert distance.max() < radius * (1 - np.cos(angle / 2)) + 5e-4
+    near, _, _ = project(truth(angle)[1:2], seam.points_B)
+    assert near[0] < radius * (1 / np.cos(angle / 2) - 1) + 5e-4
+    s = seam.s
+    assert np.diff(s).max() < 2.1e-3, "no hole at the edge"
+    assert (turns(seam) / np.diff(s)).max() < 2.0 / radius, "no sharper than the radius told"
+    assert np.abs((seam.tangents_B * seam.normals_B).sum(1)).max() < 1e-6
+    assert seam.left_B is not None
+    assert np.ptp((seam.left_B - seam.points_B)[:, 1]) < 1e-3, "the lips stay on their sides"
+    assert set(np.unique(found.region)) == {0, 1}
+
+
+def test_the_radius_is_the_one_asked_for() -> None:
+    cloud = edge_cloud(np.pi / 2, np.random.default_rng(3))
+    for radius in (0.003, 0.009):
+        (seam,) = find_seams_profile(cloud, ProfileConfig(corner_radius=radius)).seams
+        near, _, _ = project(np.zeros((1, 3)), seam.points_B)
+        assert near[0] == pytest.approx(radius * (np.sqrt(2) - 1), abs=5e-4)
+
+
+def test_grooves_that_stop_well_before_the_edge_stay_two() -> None:
+    found = find_seams_profile(edge_cloud(np.pi / 2, np.random.default_rng(4), stop=0.035), CONFIG)
+    assert len(found.seams) == 2

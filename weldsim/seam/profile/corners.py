@@ -1,0 +1,179 @@
+"""Pieces made one round the edges of a part, and branches led to the point where they meet."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.frames import unit
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.course import Course, end_to_end, stretch
+from weldsim.seam.profile.join import DISTURBED, Piece
+from weldsim.seam.profile.meet import Corner, End, alike, meeting_point, round_corner
+
+READ = 0.040  # [m] of a piece from which the direction of its end is read
+SHORTEST = 0.030  # [m] a shorter piece has no direction to be carried on in
+CORNER_STEP = 0.0005  # [m] between the points of a corner
+WIDTHS = 1.5  # of the groove, from a branch's end to where branches meet
+
+Mark = tuple[int, int]
+"""One end of a piece: its index, and 1 for its last station, -1 for its first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lead:
+    """The end of a piece, left off where an edge or another branch may have bent what was seen.
+
+    Attributes:
+        end: looking out.  at: arc length [m] on the rail at which it stands.  short: what was left off [m].
+    """
+
+    end: End
+    at: float
+    short: float
+
+
+def lay_courses(pieces: list[Piece], config: ProfileConfig) -> list[Course]:
+    """The courses of all pieces: through every edge of the part that two of them meet at, branches up to where they meet."""
+    leads = {(k, way): lead for k, piece in enumerate(pieces) for way in (-1, 1) if (lead := _lead(piece, way)) is not None}
+    links = _links(leads, config)
+    free = {mark: lead for mark, lead in leads.items() if mark not in links}
+    tails = _tails(free)
+    courses: list[Course] = []
+    used: set[int] = set()
+    # Chains begin at an end that leads to no other piece; a ring, which has none, at any of its corners.
+    starts = [mark for k in range(len(pieces)) for mark in ((k, -1), (k, 1)) if mark not in links]
+    for start in [*starts, *((k, -1) for k in range(len(pieces)))]:
+        if start[0] not in used:
+            courses.append(_walk(start, pieces, leads, links, tails, used))
+    return courses
+
+
+def _walk(
+    start: Mark,
+    pieces: list[Piece],
+    leads: dict[Mark, Lead],
+    links: dict[Mark, tuple[Mark, Corner]],
+    tails: dict[Mark, Course],
+    used: set[int],
+) -> Course:
+    """The course from one end of a piece through everything it is linked to."""
+    parts: list[Course] = [tails[start].reversed()] if start in tails else []
+    mark = start
+    while True:
+        k, way = mark
+        used.add(k)
+        out = (k, -way)
+        cut = {side: leads[k, side].at if (k, side) in tails else pieces[k].span[(side + 1) // 2] for side in (-1, 1)}
+        for each in (mark, out):
+            if each in links and not (each == start and mark == start):
+                cut[each[1]] = leads[each].at
+        part = stretch(pieces[k], cut[-1], cut[1])
+        parts.append(part if way < 0 else part.reversed())
+        if out not in links or links[out][0][0] in used:
+            break
+        mark, corner = links[out]
+        widths = np.array([pieces[k].fit.section.width, pieces[mark[0]].fit.section.width])
+        u = np.linspace(0.0, 1.0, len(corner.points))
+        parts.append(Course(corner.points, corner.normals, corner.sigma, np.interp(u, [0.0, 1.0], widths)))
+    if out in tails:
+        parts.append(tails[out])
+    return end_to_end(parts)
+
+
+def _lead(piece: Piece, way: int) -> Lead | None:
+    """Where a piece can be carried on from, or None where it is too short to have a direction."""
+    fit, rail = piece.fit, piece.fit.rail
+    length = piece.span[1] - piece.span[0]
+    if length < SHORTEST:
+        return None
+    short = min(DISTURBED, 0.25 * length)
+    at = piece.span[1] - short if way > 0 else piece.span[0] + short
+    first = int(np.clip(round(at / rail.step), 0, len(rail) - 1))
+    index = first - way * np.arange(round(min(READ, length - 2 * short) / rail.step) + 1)
+    index = index[(index >= 0) & (index < len(rail))]
+    away = np.arange(len(index)) * rail.step
+    if len(index) < 4:
+        return None
+    curve = np.polynomial.polynomial.polyfit(away, rail.points[index], 2)
+    sigma = float(fit.sigma[index].mean())
+    end = End(
+        point=rail.points[first],
+        direction=unit(-curve[1]),
+        normal=rail.n[first],
+        bend=2 * curve[2],
+        sigma=sigma,
+        turn=4 * sigma / float(away[-1]),
+        width=fit.section.width,
+        depth=fit.section.depth,
+    )
+    return Lead(end, first * rail.step, short)
+
+
+def _links(leads: dict[Mark, Lead], config: ProfileConfig) -> dict[Mark, tuple[Mark, Corner]]:
+    """For each end that goes on round an edge, where, and the corner that leads there; the nearest ends first."""
+    found: list[tuple[float, Mark, Mark, Corner]] = []
+    for a, b in combinations(leads, 2):
+        one, other = leads[a], leads[b]
+        apart = float(np.linalg.norm(one.end.point - other.end.point))
+        most = DISTURBED + config.max_filled
+        if a[0] == b[0] or apart > 2 * most or not alike(one.end, other.end):
+            continue
+        corner = round_corner(one.end, other.end, config.corner_radius, most, CORNER_STEP)
+        if corner is not None:
+            found.append((apart, a, b, corner))
+    links: dict[Mark, tuple[Mark, Corner]] = {}
+    for _, a, b, corner in sorted(found, key=lambda each: each[0]):
+        if a not in links and b not in links:
+            links[a], links[b] = (b, corner), (a, corner.reversed())
+    return links
+
+
+def _tails(leads: dict[Mark, Lead]) -> dict[Mark, Course]:
+    """What leads from the ends of branches to the point where three or more of them meet on one surface."""
+    tails: dict[Mark, Course] = {}
+    left = dict(leads)
+    while left:
+        mark, lead = left.popitem()
+        reach = WIDTHS * lead.end.width
+        near = {
+            other: each
+            for other, each in left.items()
+            if other[0] != mark[0] and np.linalg.norm(_tip(each) - _tip(lead)) < reach + WIDTHS * each.end.width
+        }
+        group = {mark: lead, **near}
+        if len({k for k, _ in group}) < 3:
+            continue
+        middle = meeting_point([each.end for each in group.values()])
+        if middle is None or any(_off(each, middle) > WIDTHS * each.end.width for each in group.values()):
+            continue
+        for other, each in group.items():
+            left.pop(other, None)
+            tails[other] = _tail(each, middle)
+    return tails
+
+
+def _tip(lead: Lead) -> Float[ndarray, "3"]:
+    """Where the piece itself ended [m]."""
+    return lead.end.point + lead.short * lead.end.direction
+
+
+def _off(lead: Lead, point: Float[ndarray, "3"]) -> float:
+    """How far before or behind a point a piece ended [m]."""
+    return abs(float((point - _tip(lead)) @ lead.end.direction))
+
+
+def _tail(lead: Lead, middle: Float[ndarray, "3"]) -> Course:
+    """The straight course from a lead to a point [m]."""
+    end, way = lead.end, middle - lead.end.point
+    length = float(np.linalg.norm(way))
+    number = max(2, int(np.ceil(length / 0.001)) + 1)
+    u = np.linspace(0.0, 1.0, number)
+    return Course(
+        points=end.point + u[:, None] * way,
+        normals=np.repeat(end.normal[None], number, 0),
+        sigma=np.hypot(end.sigma, u * length * end.turn),
+        width=np.full(number, end.width),
+    )
