@@ -11,12 +11,13 @@ from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, inverse_near, torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import LostPathError
-from weldsim.motion.posture import HOP, Blocked
-from weldsim.motion.roam import roam, touched
+from weldsim.motion.roam import roam
+from weldsim.motion.sweep import Blocked, touched
 from weldsim.motion.timing import Move, air_move
 
 LIFTS = (0.0, 0.1, 0.2, 0.3)  # [m] how far back along the wire a detour begins, tried in order
-ROAMS = 400  # tries of the search for a way round
+HOP = 1.2  # [rad] a joint that turns further while the torch is lifted has changed branch
+ROAMS = 2000  # tries of the search for a way round
 
 
 def air_moves(

@@ -1,5 +1,7 @@
 """What the arm would touch in a configuration: MuJoCo's own collision check on the compiled cell."""
 
+import copy
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -10,29 +12,84 @@ from numpy import ndarray
 from weldsim.kinematics import JOINT_NAMES
 
 ARM_ROOT = "ur5_base"
+NEAR = 0.03  # [m] gaps wider than this count as this
+
+
+@dataclass(frozen=True, kw_only=True)
+class Touch:
+    """Two bodies in contact. Attributes: first, second, their names; depth [m]."""
+
+    first: str
+    second: str
+    depth: float
+
+    def __str__(self) -> str:
+        return f"{self.first} touches {self.second} ({1e3 * self.depth:.1f} mm deep)"
 
 
 class CellCollision:
-    """Callable: the first pair of bodies in contact, in words, or None when the arm is clear of everything.
+    """Callable: the pair of bodies deepest in contact, in words, or None when the arm is clear of everything.
 
     What collides with what is the model's business (contype, conaffinity, exclusions); contacts in which the arm takes
-    no part, such as a clamp on the part, do not count.
+    no part, such as a clamp on the part, do not count. The wire has no collision body: it may touch the seam.
     """
 
     def __init__(self, model: Any) -> None:
         """Args: model of a world with the arm, its joints named as in `weldsim.kinematics.JOINT_NAMES`."""
         self._model, self._data = model, mujoco.MjData(model)
+        self._wide = copy.copy(model)
+        self._wide.geom_margin[:] = NEAR / 2  # the margins of both geoms of a pair add up
+        self._wide_data = mujoco.MjData(self._wide)
         self._qpos = np.array([model.joint(name).qposadr[0] for name in JOINT_NAMES])
         root = model.body(ARM_ROOT).id
         self._arm = np.array([model.body_rootid[body] == model.body_rootid[root] for body in model.geom_bodyid])
+        # Links two joints apart are always near each other: that says nothing about the posture.
+        link = np.array([_depth(model, int(body)) for body in model.geom_bodyid])
+        apart = np.abs(link[:, None] - link[None, :])
+        self._telling = (self._arm[:, None] | self._arm) & ~(self._arm[:, None] & self._arm & (apart <= 2))
 
     def __call__(self, q: Float[ndarray, "6"]) -> str | None:
-        self._data.qpos[self._qpos] = q
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_collision(self._model, self._data)
-        for k in range(self._data.ncon):
-            geoms, depth = self._data.contact.geom[k], -1e3 * float(self._data.contact.dist[k])
-            if depth > 0 and self._arm[geoms].any():
-                first, second = (self._model.geom(int(g)).name.removesuffix("_collision") or f"geom {g}" for g in geoms)
-                return f"{first} touches {second} ({depth:.1f} mm deep)"
-        return None
+        touch = self.touch(q)
+        return None if touch is None else str(touch)
+
+    def touch(self, q: Float[ndarray, "6"]) -> Touch | None:
+        """The deepest contact of the arm at joint angles q [rad], or None."""
+        data = self._data
+        data.qpos[self._qpos] = q
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        if data.ncon == 0:
+            return None
+        pairs, distance = data.contact.geom, data.contact.dist
+        distance = np.where(self._arm[pairs].any(axis=1), distance, 0.0)
+        deepest = int(distance.argmin())
+        if distance[deepest] >= 0:
+            return None
+        first, second = (self._model.geom(int(g)).name.removesuffix("_collision") or f"geom {g}" for g in pairs[deepest])
+        return Touch(first=first, second=second, depth=-float(distance[deepest]))
+
+    def gap(self, q: Float[ndarray, "6"]) -> float:
+        """Distance [m] of the arm at q [rad] from the nearest other body or far link, negative in contact, NEAR at most."""
+        data = self._wide_data
+        data.qpos[self._qpos] = q
+        mujoco.mj_kinematics(self._wide, data)
+        mujoco.mj_collision(self._wide, data)
+        if data.ncon == 0:
+            return NEAR
+        first, second = data.contact.geom.T
+        return min(NEAR, float(np.where(self._telling[first, second], data.contact.dist, NEAR).min()))
+
+    def shift(self, body: str, position: Float[ndarray, "3"], quaternion: Float[ndarray, "4"]) -> None:
+        """Put a fixed body elsewhere in its parent [m], wxyz: `fixture` carries the part and what holds it."""
+        for model in (self._model, self._wide):
+            index = model.body(body).id
+            model.body_pos[index], model.body_quat[index] = position, quaternion
+
+
+def _depth(model: Any, body: int) -> int:
+    """How many bodies lie between one and the world; the tool counts as the link it hangs on."""
+    depth = 0
+    while body:
+        depth += int(model.body_jntnum[body] > 0)
+        body = int(model.body_parentid[body])
+    return depth

@@ -65,10 +65,10 @@ class MotionConfig:
     """Greatest angle between the wire and the path's wire axis at a solved pose (0.05 deg)."""
     joint_rate: RadianPerMetre = 60.0
     """Greatest change of any joint per length of path: more is a branch flip or a singularity."""
-    rolls: int = 24
-    """How many rotations about the wire are tried for the first pose."""
-    candidates: int = 6
-    """How many arm postures are followed before the path is called infeasible."""
+    rolls: int = 36
+    """How many rotations about the wire are tried at each place."""
+    candidates: int = 8
+    """How many ways to hold the arm are followed before the path is called infeasible."""
     floor: Metre = 0.0
     """Height of the table top in the base frame."""
     clearance: Metre = 0.08

@@ -15,8 +15,8 @@ from weldsim.frames import Transform
 from weldsim.kinematics import torch_pose
 from weldsim.motion.arm import TORCH_SITE
 from weldsim.motion.config import MotionConfig
-from weldsim.motion.posture import Blocked
 from weldsim.motion.rail import Rail
+from weldsim.motion.sweep import STEP_LENGTH, Blocked, first_touch
 from weldsim.records import Segment
 
 POSITION_COST, AXIS_COST, POSTURE_COST = 10.0, 3.0, 1e-3  # [1/m], [1/rad], [1/rad]: posture bends the tip by under 1 um
@@ -24,8 +24,6 @@ DAMPING = 1e-10
 ITERATIONS = 40
 SETTLED = 1e-7  # [rad] a smaller step ends the iteration
 HALVINGS = 5
-LOOK = 0.005  # [m] between collision checks along a piece
-
 
 Rest = Float[ndarray, "6"] | Callable[[float], Float[ndarray, "6"]]
 
@@ -161,13 +159,14 @@ def _follow_piece(
 
 
 def check_clear(paths: list[JointPath], blocked: Blocked) -> None:
-    """Raises LostPathError at the first configuration, LOOK apart, that touches something."""
+    """Raises LostPathError at the first configuration of the swept motion that touches something; `data`: s, reason."""
     for path in paths:
         start, end = float(path.spline.x[0]), float(path.spline.x[-1])
-        for s in np.linspace(start, end, max(2, int(np.ceil((end - start) / LOOK)) + 1)):
-            touch = blocked(path.spline(s))
-            if touch is not None:
-                raise LostPathError(f"s = {1e3 * s:.1f} mm: {touch}", s=float(s), reason=touch)
+        s = np.linspace(start, end, max(2, int(np.ceil((end - start) / STEP_LENGTH)) + 1))
+        found = first_touch(path.spline(s), blocked)
+        if found is not None:
+            at = float(np.interp(found[0], np.arange(len(s)), s))
+            raise LostPathError(f"s = {1e3 * at:.1f} mm: {found[1]}", s=at, reason=found[1])
 
 
 def _strayed(

@@ -8,15 +8,17 @@ from numpy import ndarray
 
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, torch_pose
+from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
 from weldsim.motion.air import air_moves
 from weldsim.motion.arm import clearances, dexterity, kinematic_model
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import JointPath, LostPathError, check_clear, follow
-from weldsim.motion.posture import Blocked, Posture, find_postures, roll_frames, unreachable
+from weldsim.motion.ladder import Hold, climb, near
 from weldsim.motion.rail import Rail, make_rail
+from weldsim.motion.refuse import refused, unreachable
+from weldsim.motion.rungs import make_rungs
+from weldsim.motion.sweep import Blocked
 from weldsim.motion.timing import Move, piece_move
-from weldsim.motion.winding import winding_posture
 from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import JointTrajectory, Segment, TorchPath
 
@@ -33,7 +35,7 @@ class MotionPlan:
         position_error, axis_error: greatest distance [m] and angle [rad] of the joint path from the rail.
         slowest: least ratio of planned to asked welding speed; below 1 a joint limit made the weld slower.
         ramp: length at the ends of the weld in which the torch speeds up and slows down [m].
-        dexterity, clearance: least on the way [m/rad], [m].  roll: rotation about the wire chosen [rad].
+        dexterity, clearance: least on the way [m/rad], [m].  roll: rotation about the wire at the start [rad].
         notes: one sentence each, for people.
     """
 
@@ -74,7 +76,9 @@ def plan_motion(
         joint = int(np.flatnonzero(~inside)[0])
         raise MotionError(f"start: {JOINT_NAMES[joint]} at {np.rad2deg(q_start[joint]):.0f} deg (limit +-360 deg)", joint=joint)
     rail = make_rail(path, config)
-    posture, paths, moves = _first_that_holds(rail, q_start, X_FT, config, blocked)
+    hold, paths, moves = _first_that_holds(rail, q_start, X_FT, config, blocked)
+    q = np.concatenate([path.spline(path.spline.x) for path in paths])
+    clearance = float(clearances(q, config.floor, X_FT).min())
     weld = next(move for move in moves if move.segment == Segment.WELD)
     slowest, notes = weld.slowest, []
     if slowest < 0.999:
@@ -83,10 +87,8 @@ def plan_motion(
         notes.append(
             f"the first and last {1e3 * weld.ramp:.1f} mm of the weld are below the asked speed; a longer run-in would help"
         )
-    if posture.clearance < config.clearance:
-        notes.append(
-            f"the arm passes {1e3 * posture.clearance:.0f} mm from the table or itself (asked {1e3 * config.clearance:.0f} mm)"
-        )
+    if clearance < config.clearance:
+        notes.append(f"the arm passes {1e3 * clearance:.0f} mm from the table or itself (asked {1e3 * config.clearance:.0f} mm)")
     return MotionPlan(
         trajectory=_join(moves, path, rail, config),
         rail=rail,
@@ -94,80 +96,48 @@ def plan_motion(
         axis_error=max(piece.axis_error for piece in paths),
         slowest=slowest,
         ramp=weld.ramp,
-        dexterity=posture.dexterity,
-        clearance=posture.clearance,
-        roll=posture.roll,
+        dexterity=float(dexterity(q, X_FT).min()),
+        clearance=clearance,
+        roll=float(hold.roll[0]),
         notes=tuple(notes),
     )
 
 
 def _first_that_holds(
     rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
-) -> tuple[Posture, list[JointPath], list[Move]]:
-    """The best posture that can be followed all along and reached through the air, with its joint paths and moves.
+) -> tuple[Hold, list[JointPath], list[Move]]:
+    """The best way to hold the arm that can be followed all along and reached through the air, with its joint paths and moves.
 
-    Postures of one rotation about the wire come first; where none holds, one whose rotation changes on the way.
+    Where a climb is lost between its rungs, the nodes about that place are given up and the next best one is tried.
     """
     if blocked is not None and (touch := blocked(q_start)) is not None:
-        raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch)
-    try:
-        return _swept(rail, q_start, X_FT, config, blocked)
-    except MotionError:
-        found = _wound(rail, q_start, X_FT, config, blocked) if rail.roll_free else None
-        if found is None:
-            raise
-        return found
-
-
-def _wound(
-    rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
-) -> tuple[Posture, list[JointPath], list[Move]] | None:
-    """A posture that turns about the wire on the way, with its joint paths and moves; None where it does not hold either."""
-    found = winding_posture(rail, q_start, X_FT, config, blocked)
-    if found is None:
-        return None
-    first, rest = found
-    try:
-        paths = follow(rail, first, rest, kinematic_model(X_FT), X_FT, config)
-        if blocked is not None:
-            check_clear(paths, blocked)
-        moves = _moves(rail, paths, q_start, X_FT, config, blocked)
-    except MotionError:
-        return None
-    q = np.concatenate([path.spline(path.spline.x) for path in paths])
-    reached = torch_pose(q[:1], X_FT).R[0]
-    asked = roll_frames(rail.at(rail.s[:1]))[0]
-    posture = Posture(
-        q=q,
-        roll=float(np.arctan2(reached[:, 0] @ asked[:, 1], reached[:, 0] @ asked[:, 0])),
-        cost=0.0,
-        dexterity=float(dexterity(q, X_FT).min()),
-        clearance=float(clearances(q, config.floor, X_FT).min()),
-    )
-    return posture, paths, moves
-
-
-def _swept(
-    rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
-) -> tuple[Posture, list[JointPath], list[Move]]:
-    """The best posture of one rotation about the wire that holds. Raises MotionError."""
-    postures = find_postures(rail, q_start, X_FT, config, blocked)
-    model = kinematic_model(X_FT)
+        raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch, why="stale start")
+    rungs, model = make_rungs(rail, X_FT, config, blocked), kinematic_model(X_FT)
+    banned = np.zeros(rungs.cost.shape, bool)
     lost: list[LostPathError] = []
-    for posture in postures[: config.candidates]:
+    for attempt in range(config.candidates):
+        hold = climb(rungs, q_start, X_FT, config, blocked, banned)
+        if hold is None:
+            break
         try:
-            paths = follow(rail, posture.q[0], posture.q.mean(axis=0), model, X_FT, config)
+            paths = follow(rail, hold.q[0], hold.rest, model, X_FT, config)
             if blocked is not None:
                 check_clear(paths, blocked)
-            return posture, paths, _moves(rail, paths, q_start, X_FT, config, blocked)
+            return hold, paths, _moves(rail, paths, q_start, X_FT, config, blocked)
         except LostPathError as error:
             lost.append(error)
+            banned |= near(rungs, hold, float(str(error.data["s"])), reach=1 + attempt)
+    if not lost:
+        raise refused(rail, rungs, X_FT, config)
     furthest = max(lost, key=lambda error: float(str(error.data["s"])))
     s, reason = float(str(furthest.data["s"])), str(furthest.data["reason"])
     if reason == "out of reach":
         raise unreachable(rail, s, "the arm cannot follow the path to here in any posture") from furthest
     index = rail.path_index(s)
-    raise MotionError(f"path pose {index}: no posture gets further than {furthest}", index=index, s=s, reason=reason) from furthest
+    why = {"branch flip": "joint jump", "joint limit": "joint limit", "rough path": "orientation jump"}.get(reason, "collision")
+    raise MotionError(
+        f"path pose {index}: no posture gets further than {furthest}", index=index, s=s, reason=reason, why=why
+    ) from furthest
 
 
 def _moves(

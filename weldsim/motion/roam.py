@@ -1,31 +1,38 @@
-"""A way through the air where the straight joint move is blocked: two random trees that grow towards each other (RRT-Connect,
-Kuffner and LaValle 2000), then shortened. The same question always gets the same answer."""
+"""A way through the air where the straight joint move is blocked: ompl's RRT-Connect (Kuffner and LaValle 2000), then shortened.
 
+The same question always gets the same answer: the search is seeded and stops after a number of looks, never after a time.
+"""
+
+from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.kinematics import JOINT_LIMIT
-from weldsim.motion.posture import Blocked
+from weldsim.motion.sweep import Blocked, touched
 
-STEP = 0.02  # [rad] of the fastest joint between collision checks
+STEP = 0.03  # [rad] between looks of the search itself; the way found is looked at again in the steps of `touched`
 STRIDE = 0.35  # [rad] a tree grows by at most so much at once
 ROOM = 1.6  # [rad] how far beyond start and goal each joint may go
 SHORTCUTS = 80
+SEEDS = 3  # searches, each looking twice as closely as the one before, until a way is found that is clear all along
 
 Joints = Float[ndarray, "6"]
 
 
-def touched(a: Joints, b: Joints, blocked: Blocked) -> str | None:
-    """What the straight joint move from a to b touches first, or None; the ends are looked at first."""
-    n = int(np.ceil(np.abs(b - a).max() / STEP))
-    order = np.concatenate([[0, n + 1], np.arange(1, n + 1)])
-    return next((touch for k in order if (touch := blocked(a + k / (n + 1) * (b - a))) is not None), None)
+@cache
+def _ompl() -> tuple[Any, Any, Any]:
+    """The library's modules: it takes a tenth of a second to load, and most jobs never need it."""
+    from ompl import base, geometric, util
+
+    util.noOutputHandler()
+    return base, geometric, util
 
 
-def roam(start: Joints, goal: Joints, blocked: Blocked, *, tries: int = 1500, seed: int = 0) -> list[Joints] | None:
+def roam(start: Joints, goal: Joints, blocked: Blocked, *, tries: int = 3000, seed: int = 0) -> list[Joints] | None:
     """Corners of a clear way from start to goal, both included, straight in joint space between them; None where none was found.
 
     Args:
@@ -36,45 +43,49 @@ def roam(start: Joints, goal: Joints, blocked: Blocked, *, tries: int = 1500, se
         return None
     if touched(start, goal, blocked) is None:
         return [start, goal]
-    rng = np.random.default_rng(seed)
-    low = np.maximum(np.minimum(start, goal) - ROOM, -JOINT_LIMIT)
-    high = np.minimum(np.maximum(start, goal) + ROOM, JOINT_LIMIT)
-    trees, parents = ([start], [goal]), ([-1], [-1])
-    for k in range(tries):
-        one, two = k % 2, 1 - k % 2
-        reached = _grow(trees[one], parents[one], rng.uniform(low, high), blocked)
-        if reached is None:
-            continue
-        while True:
-            met = _grow(trees[two], parents[two], trees[one][reached], blocked)
-            if met is None:
-                break
-            if np.abs(trees[two][met] - trees[one][reached]).max() < 1e-9:
-                first, last = _branch(trees[one], parents[one], reached), _branch(trees[two], parents[two], met)
-                corners = [*first[::-1], *last[1:]] if one == 0 else [*last[::-1], *first[1:]]
-                return _shortened(corners, blocked, rng)
+    for attempt in range(SEEDS):
+        corners = _search(start, goal, blocked, tries, SEEDS * seed + attempt + 1, STEP / 2**attempt)
+        if corners is None:
+            return None
+        if all(touched(a, b, blocked) is None for a, b in pairwise(corners)):
+            return _shortened(corners, blocked, np.random.default_rng(seed))
     return None
 
 
-def _grow(tree: list[Joints], parents: list[int], towards: Joints, blocked: Blocked) -> int | None:
-    """Index of a new node one stride from the nearest one towards a point; None where that is blocked."""
-    nearest = int(np.linalg.norm(np.array(tree) - towards, axis=1).argmin())
-    step = towards - tree[nearest]
-    node = tree[nearest] + step * min(1.0, STRIDE / max(float(np.abs(step).max()), 1e-12))
-    if touched(tree[nearest], node, blocked) is not None:
+def _search(start: Joints, goal: Joints, blocked: Blocked, tries: int, seed: int, step: float) -> list[Joints] | None:
+    """Corners of a way that is clear as far as looks `step` [rad] apart show; None after `tries` growths of the trees."""
+    base, geometric, util = _ompl()
+    low = np.maximum(np.minimum(start, goal) - ROOM, -JOINT_LIMIT)
+    high = np.minimum(np.maximum(start, goal) + ROOM, JOINT_LIMIT)
+    space, bounds = base.RealVectorStateSpace(6), base.RealVectorBounds(6)
+    for i in range(6):
+        bounds.setLow(i, float(low[i]))
+        bounds.setHigh(i, float(high[i]))
+    space.setBounds(bounds)
+    util.RNG.setSeed(seed)
+    information = base.SpaceInformation(space)
+    information.setStateValidityChecker(lambda state: blocked(_joints(state)) is None)
+    information.setStateValidityCheckingResolution(step / float(np.linalg.norm(high - low)))
+    information.setup()
+    problem = base.ProblemDefinition(information)
+    ends = [information.allocState(), information.allocState()]
+    for state, q in zip(ends, (start, goal), strict=True):
+        for i in range(6):
+            state[i] = float(q[i])
+    problem.setStartAndGoalStates(*ends)
+    planner = geometric.RRTConnect(information)
+    planner.setRange(STRIDE)
+    planner.setProblemDefinition(problem)
+    planner.setup()
+    looks = iter(range(tries))
+    planner.solve(base.PlannerTerminationCondition(lambda: next(looks, None) is None))
+    if not problem.hasExactSolution():
         return None
-    tree.append(node)
-    parents.append(nearest)
-    return len(tree) - 1
+    return [np.array(start), *(_joints(state) for state in problem.getSolutionPath().getStates()[1:-1]), np.array(goal)]
 
 
-def _branch(tree: list[Joints], parents: list[int], leaf: int) -> list[Joints]:
-    """Nodes from a leaf to its tree's root."""
-    out = []
-    while leaf >= 0:
-        out.append(tree[leaf])
-        leaf = parents[leaf]
-    return out
+def _joints(state: Any) -> Joints:
+    return np.array([state[i] for i in range(6)])
 
 
 def _shortened(corners: list[Joints], blocked: Blocked, rng: np.random.Generator) -> list[Joints]:

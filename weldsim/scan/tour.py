@@ -97,7 +97,8 @@ def way(start: Joints, goal: Joints, config: "MotionConfig", blocked: Blocked, v
     Raises:
         MotionError: none of these is clear; `data`: view, reason.
     """
-    from weldsim.motion.roam import roam, touched
+    from weldsim.motion.roam import roam
+    from weldsim.motion.sweep import touched
     from weldsim.motion.timing import air_move
 
     touch = None

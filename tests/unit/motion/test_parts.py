@@ -11,8 +11,8 @@ from weldsim.kinematics import inverse_near, torch_pose
 from weldsim.motion.arm import TORCH_SITE, jacobian, kinematic_model
 from weldsim.motion.collision import CellCollision
 from weldsim.motion.config import MotionConfig
-from weldsim.motion.posture import roll_frames
 from weldsim.motion.rail import make_rail
+from weldsim.motion.rungs import roll_frames
 from weldsim.motion.timing import air_move
 from weldsim.mounts import X_FT
 from weldsim.scene.config import SceneConfig

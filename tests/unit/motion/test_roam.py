@@ -5,7 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from weldsim.motion.roam import STEP, roam, touched
+from weldsim.motion.roam import roam
+from weldsim.motion.sweep import STEP_TURN as STEP
+from weldsim.motion.sweep import touched
 
 WALL = 0.3  # [rad] half the thickness of the wall between start and goal
 

@@ -1,0 +1,102 @@
+"""Why a weld cannot be held: the place, the reason, and what to do, as errors."""
+
+import numpy as np
+
+from weldsim.errors import MotionError, UnreachableError
+from weldsim.frames import Transform
+from weldsim.kinematics import D1, REACH, inverse
+from weldsim.motion.config import MotionConfig
+from weldsim.motion.ladder import break_at, cuts
+from weldsim.motion.rail import Rail
+from weldsim.motion.rungs import Rungs, turned
+
+CLOSE = 0.0005  # [m] to which the first unreachable place is found
+
+
+def refused(rail: Rail, rungs: Rungs, X_FT: Transform, config: MotionConfig) -> MotionError:
+    """The error that says why there is no climb over the rungs; `data`: index, s, reason, why, and split where a cut would help."""
+    first = rungs.first_refused
+    if first is None:
+        return _broken(rail, rungs)
+    refusal, s = rungs.refusals[first], float(rungs.s[first])
+    if refusal is not None and refusal.why == "unreachable":
+        return unreachable(rail, _first_unreachable(rail, float(rungs.s[max(first - 1, 0)]), s, X_FT.inverse(), config))
+    if refusal is None or refusal.why == "singular":
+        return MotionError(
+            f"{where(rail, s)}: every joint solution is at a singularity; move the part or change the torch angles",
+            index=rail.path_index(s),
+            s=s,
+            reason="singular",
+            why="singular",
+        )
+    return MotionError(
+        f"{where(rail, s)}: all {refusal.options} postures that reach it touch something, the least deep: {refusal.text};"
+        " move the part or the fixture, or change the torch angles",
+        index=rail.path_index(s),
+        s=s,
+        reason=refusal.text,
+        why="collision",
+        depth=refusal.depth,
+    )
+
+
+def _broken(rail: Rail, rungs: Rungs) -> MotionError:
+    """Every place has a posture, but no continuous motion joins them all."""
+    last, after = break_at(rungs)
+    split = cuts(rungs)
+    inside = [s for s in split or [] if rail.start < s < rail.end]
+    if inside and split == inside:
+        advice = f"weld it in {len(inside) + 1} pieces, cut at s = {', '.join(f'{1e3 * s:.0f}' for s in inside)} mm"
+    else:
+        advice = "move the part or change the torch angles"
+    return MotionError(
+        f"{where(rail, after)}: no sweep of the arm without branch flip or collision goes beyond s = {1e3 * last:.1f} mm; {advice}",
+        index=rail.path_index(after),
+        s=after,
+        reason="branch flip",
+        why="joint jump",
+        split=tuple(inside) if split == inside else (),
+    )
+
+
+def where(rail: Rail, s: float) -> str:
+    """The place in words: arc length, piece, pose of the path, position."""
+    p = rail.at(np.array([s])).p[0]
+    piece = "lead-in" if s < rail.start - 1e-9 else "lead-out" if s > rail.end + 1e-9 else "weld"
+    return (
+        f"torch at s = {1e3 * s:.1f} mm of the {piece} (pose {rail.path_index(s)}, ({p[0]:.3f}, {p[1]:.3f}, {p[2]:.3f}) m in base)"
+    )
+
+
+def unreachable(rail: Rail, s: float, reason: str = "no joint solution for any rotation about the wire") -> UnreachableError:
+    """The error that says where on the path the arm gives up, and what to do."""
+    p = rail.at(np.array([s])).p[0]
+    distance = float(np.linalg.norm(p - [0.0, 0.0, D1]))
+    if not rail.roll_free:
+        reason = reason.replace("any rotation", "the given rotation")
+    return UnreachableError(
+        f"{where(rail, s)}: {reason}; {distance:.3f} m from the shoulder (reach of the flange {REACH} m);"
+        " move the part or change the torch angles",
+        index=rail.path_index(s),
+        s=s,
+        reason=reason,
+        why="unreachable",
+        position=tuple(float(x) for x in p),
+        distance=distance,
+        reach=REACH,
+    )
+
+
+def _first_unreachable(rail: Rail, near: float, far: float, X_TF: Transform, config: MotionConfig) -> float:
+    """The smallest arc length in [near, far] that no roll reaches, to CLOSE, given that `far` is one."""
+    count = config.rolls if rail.roll_free else 1
+    low, high = near, far
+    while high - low > CLOSE:
+        middle = (low + high) / 2
+        X_BT = rail.at(np.array([middle]))
+        rolls = 2 * np.pi * np.arange(count) / count
+        if any(len(inverse((Transform("BT", turned(X_BT.R, float(roll)), X_BT.p) @ X_TF)[0])) for roll in rolls):
+            low = middle
+        else:
+            high = middle
+    return high

@@ -1,0 +1,172 @@
+"""The rungs of the ladder that a weld climbs: at places along the rail, every way the arm can hold the torch.
+
+A place, a rotation about the wire and one of eight branches name a joint solution. A branch is told by three signs, those of the
+factors of the UR arm's Jacobian determinant (elbow, wrist, shoulder): it cannot be left without passing a singularity.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from weldsim.frames import Transform
+from weldsim.kinematics import A2, A3, D5, inverse
+from weldsim.motion.arm import clearances, dexterity
+from weldsim.motion.collision import NEAR, CellCollision
+from weldsim.motion.config import MotionConfig
+from weldsim.motion.rail import Rail
+from weldsim.motion.sweep import Blocked
+
+TURN, LENGTH = 0.12, 0.012  # [rad], [m] between rungs, at most
+SHY = 0.12  # [m/rad] dexterity below which a posture is penalised
+SINGULAR = 0.012  # [m/rad] dexterity below which it is not used
+SPEEDLESS = 1e-3  # [m] gaps count as at least this
+
+Why = Literal["unreachable", "singular", "collision"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Refusal:
+    """Why no posture will do at a place. Attributes: why; text, for people; depth [m], of a collision; options, postures tried."""
+
+    why: Why
+    text: str
+    depth: float = 0.0
+    options: int = 0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Rungs:
+    """Postures along a rail.
+
+    Attributes:
+        s: (w,) arc lengths [m].  frames: (w, 3, 3) R_BT at rotation 0 about the wire.  p: (w, 3) tips [m].
+        rolls: (r,) rotations about the wire [rad], evenly spaced over the whole turn, or 0 alone.
+        q: (w, r, 8, 6) joint angles in (-pi, pi], NaN where the branch has no solution.
+        cost: (w, r, 8) less is better, inf where the posture cannot be used.
+        refusals: one for each place, None where some posture will do.
+    """
+
+    s: Float[ndarray, "w"]
+    frames: Float[ndarray, "w 3 3"]
+    p: Float[ndarray, "w 3"]
+    rolls: Float[ndarray, "r"]
+    q: Float[ndarray, "w r 8 6"]
+    cost: Float[ndarray, "w r 8"]
+    refusals: tuple[Refusal | None, ...]
+
+    @property
+    def first_refused(self) -> int | None:
+        """Index of the first place where no posture will do."""
+        return next((i for i, refusal in enumerate(self.refusals) if refusal is not None), None)
+
+
+def make_rungs(
+    rail: Rail, X_FT: Transform, config: MotionConfig, blocked: Blocked | None = None, at: Float[ndarray, "w"] | None = None
+) -> Rungs:
+    """Every posture at places along the rail near enough to each other, judged.
+
+    Args:
+        at: the places [m], by default at most LENGTH and TURN apart.
+    """
+    s = places(rail) if at is None else at
+    X_BT = rail.at(s)
+    count = config.rolls if rail.roll_free else 1
+    rolls = 2 * np.pi * np.arange(count) / count
+    frames = roll_frames(X_BT) if rail.roll_free else X_BT.R
+    q = np.full((len(s), count, 8, 6), np.nan)
+    X_TF = X_FT.inverse()
+    for i in range(len(s)):
+        for k, roll in enumerate(rolls):
+            solutions = inverse(Transform("BT", turned(frames[i], roll), X_BT.p[i]) @ X_TF)
+            if len(solutions):
+                q[i, k, branch_of(solutions)] = solutions
+    cost, refusals = _judged(q, X_FT, config, blocked)
+    return Rungs(s=s, frames=frames, p=X_BT.p, rolls=rolls, q=q, cost=cost, refusals=refusals)
+
+
+def branch_of(q: Float[ndarray, "*n 6"]) -> Int[ndarray, "*n"]:
+    """0 to 7: which of the eight sheets of joint space, divided by the singularities, each q [rad] lies on."""
+    reach = A2 * np.cos(q[..., 1]) + A3 * np.cos(q[..., 1] + q[..., 2]) + D5 * np.sin(q[..., 1] + q[..., 2] + q[..., 3])
+    return 1 * (np.sin(q[..., 2]) < 0) + 2 * (np.sin(q[..., 4]) < 0) + 4 * (reach < 0)
+
+
+def turned(R: Float[ndarray, "*m 3 3"], roll: Float[ndarray, "*m"] | float) -> Float[ndarray, "*m 3 3"]:
+    """The frames turned by `roll` [rad] about their own z."""
+    c, s = np.cos(roll), np.sin(roll)
+    zero, one = np.zeros_like(c), np.ones_like(c)
+    turn = np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], -2)
+    return R @ turn
+
+
+def roll_frames(X_BT: Transform) -> Float[ndarray, "m 3 3"]:
+    """Rotations whose z is the wire and whose x turns about it as little as possible from pose to pose."""
+    frames = [X_BT.R[0]]
+    for z in X_BT.R[1:, :, 2]:
+        x = frames[-1][:, 0] - (frames[-1][:, 0] @ z) * z
+        x /= np.linalg.norm(x)
+        frames.append(np.stack([x, np.cross(z, x), z], axis=1))
+    return np.stack(frames)
+
+
+def places(rail: Rail, length: float = LENGTH, turn: float = TURN) -> Float[ndarray, "w"]:
+    """Arc lengths from end to end of the rail, at most `length` [m] and `turn` [rad] of the torch apart."""
+    s = np.linspace(rail.s[0], rail.s[-1], max(2, int((rail.s[-1] - rail.s[0]) / 0.0005)))
+    R = rail.at(s).R
+    turning = R[:, :, 2] if rail.roll_free else R.reshape(len(R), 9) / np.sqrt(2.0)
+    stride = np.maximum(np.diff(s) / length, np.linalg.norm(np.diff(turning, axis=0), axis=1) / turn)
+    gone = np.concatenate([[0.0], np.cumsum(stride)])
+    return np.unique(np.interp(np.linspace(0.0, gone[-1], max(3, int(np.ceil(gone[-1])) + 1)), gone, s))
+
+
+def _judged(
+    q: Float[ndarray, "w r 8 6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
+) -> tuple[Float[ndarray, "w r 8"], tuple[Refusal | None, ...]]:
+    """Cost of each posture, by singularities, table and obstacles, and why there is none where there is none."""
+    there = ~np.isnan(q[..., 0])
+    cost = np.full(there.shape, np.inf)
+    agile = np.zeros(there.shape)
+    if there.any():
+        agile[there] = dexterity(q[there], X_FT)
+        free = clearances(q[there], config.floor, X_FT)
+        near = np.clip(1.0 - free / max(config.clearance, 1e-9), 0.0, 1.0)
+        cost[there] = 2.0 * (SHY / np.clip(agile[there], SINGULAR, SHY)) - 2.0 + 20.0 * near
+    cost[there & (agile < SINGULAR)] = np.inf
+    touches: dict[tuple[int, ...], tuple[float, str]] = {}
+    if blocked is not None:
+        for index in zip(*np.nonzero(np.isfinite(cost)), strict=True):
+            found, gap = _touch(q[index], blocked)
+            if found is not None:
+                cost[index] = np.inf
+                touches[tuple(int(i) for i in index)] = found
+            else:
+                cost[index] += 0.5 * (NEAR / max(gap, SPEEDLESS) - 1.0)
+    return cost, tuple(_refusal(i, there[i], cost[i], touches) for i in range(len(q)))
+
+
+def _touch(q: Float[ndarray, "6"], blocked: Blocked) -> tuple[tuple[float, str] | None, float]:
+    """Depth [m] and words of what q touches, or None; and the gap to the nearest body [m]."""
+    if isinstance(blocked, CellCollision):
+        gap = blocked.gap(q)
+        if gap > 0 and blocked(q) is None:
+            return None, gap
+        touch = blocked.touch(q)
+        return (None if touch is None else (touch.depth, str(touch))), gap
+    text = blocked(q)
+    return (None if text is None else (0.0, text)), NEAR
+
+
+def _refusal(
+    i: int, there: ndarray, cost: Float[ndarray, "r 8"], touches: dict[tuple[int, ...], tuple[float, str]]
+) -> Refusal | None:
+    if np.isfinite(cost).any():
+        return None
+    if not there.any():
+        return Refusal(why="unreachable", text="no joint solution for any rotation about the wire")
+    mine = [found for index, found in touches.items() if index[0] == i]
+    if mine:
+        depth, text = min(mine)
+        return Refusal(why="collision", text=text, depth=depth, options=len(mine))
+    return Refusal(why="singular", text="every joint solution is at a singularity", options=int(there.sum()))
