@@ -19,6 +19,7 @@ RANGES = {
     "max_side_step": (0.0, 0.1),
     "max_gap": (0.0, 0.5),
     "max_filled": (0.0, 0.5),
+    "corner_radius": (1e-4, 0.1),
     "detection_factor": (0.1, 1000.0),
     "points_per_metre": (1e3, 1e6),
 }

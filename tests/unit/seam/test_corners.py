@@ -5,7 +5,7 @@ import pytest
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.curves import project
+from weldsim.curves import arc_length, project
 from weldsim.records import PointCloud, Seam
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.find import find_seams_profile
@@ -75,3 +75,26 @@ def test_the_radius_is_the_one_asked_for() -> None:
 def test_grooves_that_stop_well_before_the_edge_stay_two() -> None:
     found = find_seams_profile(edge_cloud(np.pi / 2, np.random.default_rng(4), stop=0.035), CONFIG)
     assert len(found.seams) == 2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_branches_end_where_they_meet(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = (v.ravel() for v in np.meshgrid(np.arange(-HALF, HALF, SPACING), np.arange(-HALF, HALF, SPACING)))
+    x, y = x + rng.uniform(-3e-4, 3e-4, x.size), y + rng.uniform(-3e-4, 3e-4, y.size)
+    angles = rng.uniform(0, 2 * np.pi) + np.array([0.0, 2.1, 4.2]) + rng.uniform(-0.2, 0.2, 3)
+    groove = np.zeros(len(x))
+    for angle in angles:
+        along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+        arm = np.maximum(0.0, 1 - np.abs(across) / (WIDTH / 2)) * DEPTH * (along > 0)
+        groove = np.maximum(groove, np.where(along < 0.085, arm, 0.0))
+    points = np.stack([x, y, -groove + rng.normal(0, 1e-4, len(x))], axis=1)
+    found = find_seams_profile(PointCloud(points=points, viewpoints=np.array([[0.02, 0.01, 0.4]])), CONFIG)
+    assert len(found.seams) == 3
+    for seam in found.seams:
+        ends = np.linalg.norm(seam.points_B[[0, -1]], axis=1)
+        azimuth = np.arctan2(*seam.points_B[-int(ends.argmax())][1::-1])
+        assert np.cos(angles - azimuth).max() > np.cos(0.01), "along one of the arms"
+        assert ends.min() < 0.001, "at the junction"
+        assert 0.080 < ends.max() < 0.088
+        assert arc_length(seam.points_B)[-1] < 0.09

@@ -9,14 +9,16 @@ from numpy import ndarray
 
 from weldsim.frames import unit
 from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.branches import WIDTHS
 from weldsim.seam.profile.course import Course, end_to_end, stretch
+from weldsim.seam.profile.ends import station_mask
 from weldsim.seam.profile.join import DISTURBED, Piece
-from weldsim.seam.profile.meet import Corner, End, alike, meeting_point, round_corner
+from weldsim.seam.profile.meet import MOST_MISS, Corner, End, alike, meeting_point, round_corner
 
 READ = 0.040  # [m] of a piece from which the direction of its end is read
 SHORTEST = 0.030  # [m] a shorter piece has no direction to be carried on in
 CORNER_STEP = 0.0005  # [m] between the points of a corner
-WIDTHS = 1.5  # of the groove, from a branch's end to where branches meet
+STEEPEST = 0.9  # cosine between a branch and the groove it runs into
 
 Mark = tuple[int, int]
 """One end of a piece: its index, and 1 for its last station, -1 for its first."""
@@ -35,12 +37,28 @@ class Lead:
     short: float
 
 
+@dataclass(frozen=True, eq=False)
+class Tail:
+    """What a branch is led on by. Attributes: at, where on its rail that begins [m]; course."""
+
+    at: float
+    course: Course
+
+
 def lay_courses(pieces: list[Piece], config: ProfileConfig) -> list[Course]:
     """The courses of all pieces: through every edge of the part that two of them meet at, branches up to where they meet."""
-    leads = {(k, way): lead for k, piece in enumerate(pieces) for way in (-1, 1) if (lead := _lead(piece, way)) is not None}
+    leads, deeper = (
+        {(k, way): lead for k, piece in enumerate(pieces) for way in (-1, 1) if (lead := _lead(piece, way, off)) is not None}
+        for off in (DISTURBED, 2 * DISTURBED)
+    )
     links = _links(leads, config)
     free = {mark: lead for mark, lead in leads.items() if mark not in links}
-    tails = _tails(free)
+    tails = _tails([free, {mark: lead for mark, lead in deeper.items() if mark in free}])
+    tails |= {
+        mark: Tail(lead.at, _straight_on(lead, foot))
+        for mark, lead in free.items()
+        if mark not in tails and (foot := _foot(lead, [piece for k, piece in enumerate(pieces) if k != mark[0]])) is not None
+    }
     courses: list[Course] = []
     used: set[int] = set()
     # Chains begin at an end that leads to no other piece; a ring, which has none, at any of its corners.
@@ -56,17 +74,17 @@ def _walk(
     pieces: list[Piece],
     leads: dict[Mark, Lead],
     links: dict[Mark, tuple[Mark, Corner]],
-    tails: dict[Mark, Course],
+    tails: dict[Mark, Tail],
     used: set[int],
 ) -> Course:
     """The course from one end of a piece through everything it is linked to."""
-    parts: list[Course] = [tails[start].reversed()] if start in tails else []
+    parts: list[Course] = [tails[start].course.reversed()] if start in tails else []
     mark = start
     while True:
         k, way = mark
         used.add(k)
         out = (k, -way)
-        cut = {side: leads[k, side].at if (k, side) in tails else pieces[k].span[(side + 1) // 2] for side in (-1, 1)}
+        cut = {side: tails[k, side].at if (k, side) in tails else pieces[k].span[(side + 1) // 2] for side in (-1, 1)}
         for each in (mark, out):
             if each in links and not (each == start and mark == start):
                 cut[each[1]] = leads[each].at
@@ -79,17 +97,17 @@ def _walk(
         u = np.linspace(0.0, 1.0, len(corner.points))
         parts.append(Course(corner.points, corner.normals, corner.sigma, np.interp(u, [0.0, 1.0], widths)))
     if out in tails:
-        parts.append(tails[out])
+        parts.append(tails[out].course)
     return end_to_end(parts)
 
 
-def _lead(piece: Piece, way: int) -> Lead | None:
-    """Where a piece can be carried on from, or None where it is too short to have a direction."""
+def _lead(piece: Piece, way: int, off: float) -> Lead | None:
+    """Where a piece can be carried on from, `off` [m] left off if it is long enough; None where it has no direction."""
     fit, rail = piece.fit, piece.fit.rail
     length = piece.span[1] - piece.span[0]
     if length < SHORTEST:
         return None
-    short = min(DISTURBED, 0.25 * length)
+    short = min(off, 0.25 * length)
     at = piece.span[1] - short if way > 0 else piece.span[0] + short
     first = int(np.clip(round(at / rail.step), 0, len(rail) - 1))
     index = first - way * np.arange(round(min(READ, length - 2 * short) / rail.step) + 1)
@@ -131,10 +149,14 @@ def _links(leads: dict[Mark, Lead], config: ProfileConfig) -> dict[Mark, tuple[M
     return links
 
 
-def _tails(leads: dict[Mark, Lead]) -> dict[Mark, Course]:
-    """What leads from the ends of branches to the point where three or more of them meet on one surface."""
-    tails: dict[Mark, Course] = {}
-    left = dict(leads)
+def _tails(looks: list[dict[Mark, Lead]]) -> dict[Mark, Tail]:
+    """What leads from the ends of branches to the point where three or more of them meet on one surface.
+
+    Args:
+        looks: the free ends; then the same with more left off, for where one has run on into another branch.
+    """
+    tails: dict[Mark, Tail] = {}
+    left = dict(looks[0])
     while left:
         mark, lead = left.popitem()
         reach = WIDTHS * lead.end.width
@@ -143,16 +165,37 @@ def _tails(leads: dict[Mark, Lead]) -> dict[Mark, Course]:
             for other, each in left.items()
             if other[0] != mark[0] and np.linalg.norm(_tip(each) - _tip(lead)) < reach + WIDTHS * each.end.width
         }
-        group = {mark: lead, **near}
-        if len({k for k, _ in group}) < 3:
+        names = [mark, *near]
+        if len({k for k, _ in names}) < 3:
             continue
-        middle = meeting_point([each.end for each in group.values()])
-        if middle is None or any(_off(each, middle) > WIDTHS * each.end.width for each in group.values()):
-            continue
-        for other, each in group.items():
-            left.pop(other, None)
-            tails[other] = _tail(each, middle)
+        for look in looks:
+            group = {name: look[name] for name in names if name in look}
+            middle = meeting_point([each.end for each in group.values()]) if len(group) == len(names) else None
+            if middle is not None and all(_off(each, middle) < WIDTHS * each.end.width for each in group.values()):
+                tails |= {name: Tail(each.at, _straight_on(each, middle)) for name, each in group.items()}
+                left = {name: each for name, each in left.items() if name not in names}
+                break
     return tails
+
+
+def _foot(lead: Lead, others: list[Piece]) -> Float[ndarray, "3"] | None:
+    """The point [m] at which a branch, carried straight on, meets the line of another groove, or None."""
+    end = lead.end
+    for other in others:
+        rail, inside = other.fit.rail, station_mask(other.fit, other.span)
+        points, along = rail.points[inside], rail.t[inside]
+        way = points - end.point
+        ahead = way @ end.direction
+        off = np.linalg.norm(way - ahead[:, None] * end.direction, axis=1)
+        reach = WIDTHS * max(end.width, other.fit.section.width)
+        near = (np.abs(ahead - lead.short) < reach) & (ahead > 0)
+        if not near.any():
+            continue
+        k = int(np.where(near, off, np.inf).argmin())
+        crosses = abs(float(along[k] @ end.direction)) < STEEPEST
+        if 0 < k < len(points) - 1 and crosses and off[k] < MOST_MISS * end.width:
+            return points[k]
+    return None
 
 
 def _tip(lead: Lead) -> Float[ndarray, "3"]:
@@ -165,7 +208,7 @@ def _off(lead: Lead, point: Float[ndarray, "3"]) -> float:
     return abs(float((point - _tip(lead)) @ lead.end.direction))
 
 
-def _tail(lead: Lead, middle: Float[ndarray, "3"]) -> Course:
+def _straight_on(lead: Lead, middle: Float[ndarray, "3"]) -> Course:
     """The straight course from a lead to a point [m]."""
     end, way = lead.end, middle - lead.end.point
     length = float(np.linalg.norm(way))

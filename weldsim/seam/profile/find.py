@@ -14,6 +14,7 @@ from weldsim.records import PointCloud, Rejection, SeamFindings
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.atlas import Atlas, make_atlas
 from weldsim.seam.profile.beyond import carry_on
+from weldsim.seam.profile.branches import part_at_branches
 from weldsim.seam.profile.corners import lay_courses
 from weldsim.seam.profile.course import Course, to_seam
 from weldsim.seam.profile.ends import seam_span, station_mask
@@ -84,7 +85,8 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
             rejected.append(_rejection(line, reason))
     joined = join_pieces(found, atlas, config)
     whole = _without_doubles([piece for piece in joined if piece.whole])
-    return _without_doubles([carry_on(piece, atlas, config) for piece in whole]), rejected
+    carried = _without_doubles([carry_on(piece, atlas, config) for piece in whole])
+    return _without_doubles(part_at_branches(carried, atlas, config)), rejected
 
 
 def _without_doubles(pieces: list[Piece]) -> list[Piece]:
