@@ -202,6 +202,21 @@ def test_bad_options_are_refused_before_the_work(scan, tmp_path, monkeypatch, ca
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("where", ["under", "on", "beside"])
+def test_a_viewpoint_that_cannot_be_is_named(scan, capsys, where):
+    cloud = read_cloud(scan / "cloud.ply")
+    middle, (camera,) = cloud.points.mean(axis=0), cloud.viewpoints
+    away = {"under": middle - camera, "on": np.zeros(3), "beside": np.array([5.0, 0.0, 0.0])}[where]
+    told = [f"{value:.4f}" for value in middle + away]
+    assert main(["plan", str(scan / "cloud.ply"), "--viewpoint", *told]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert "is that where the camera stood?" in err
+    assert main(["plan", str(scan / "plain.ply")]) == 1  # where there is no groove, the viewpoint is not to blame
+    assert "camera" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("reader", ["true", "head -c 10"])
 def test_a_reader_that_goes_away_is_no_news(scan, reader, unbuffered):

@@ -80,7 +80,7 @@ class Plan(ConfigOptions):
                 self._write_report(page, picture, chosen, clock, config)
         if not result.findings.seams:
             raise NoSeamError(
-                f"{self.cloud}: no seam found; {_reasons(result.findings)}",
+                f"{self.cloud}: no seam found; {_reasons(result.findings)}{self._viewpoint_hint(result.cloud, config)}",
                 rejected=[asdict(refused) for refused in result.findings.rejected],
             )
         document = self._document(chosen, numbers, clock)
@@ -105,6 +105,16 @@ class Plan(ConfigOptions):
             check_folder(nearest_folder(page), page)
             page = picture = None  # in a folder still to be made
         check_outputs((self.out, self.csv, page, picture), (self.cloud, self.intrinsics, self.pose, self.config))
+
+    def _viewpoint_hint(self, cloud: "PointCloud", config: "CellConfig") -> str:
+        """What to do where the viewpoint keeps a seam from being found; empty where it does not."""
+        from weldsim.seam.find import seams_without_view
+
+        if not len(cloud.viewpoints) or not seams_without_view(cloud, config.seam):
+            return ""
+        stood = " and ".join("({:.3f}, {:.3f}, {:.3f})".format(*point) for point in cloud.viewpoints[:3])
+        option = "--viewpoint X Y Z" if self.intrinsics is None else "--pose"
+        return f"; without the viewpoint {stood} m a groove is there: is that where the camera stood? {option} says otherwise"
 
     def _report_files(self) -> tuple[Path | None, Path | None]:
         """HTML and PNG."""

@@ -25,7 +25,7 @@ GRAZING = np.radians(85.0)  # the noise law has a pole at 90 deg: angles are cut
 RANGES = {
     "blur": (0.0, 20.0),
     "noise": (0.0, 100.0),
-    "offset": (-1.0, 1.0),
+    "offset": (-0.2, 0.2),
     "wiggling": (0.0, 1.0),
     "wiggling_period": (0.01, 10.0),
     "bounces": (0, 256),
