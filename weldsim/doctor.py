@@ -26,6 +26,7 @@ _APT_PACKAGES = {
     "libusb-1.0": "libusb-1.0-0",
     "libGL": "libgl1",
     "libEGL": "libegl1",
+    "libOSMesa": "libosmesa6",
     "libX11": "libx11-6",
     "libudev": "libudev1",
     "libidn2": "libidn2-0",
@@ -60,7 +61,7 @@ def diagnose() -> tuple[Check, ...]:
         check_python(sys.version_info[:3]),
         *libraries,
         rendering.result(),
-        check_writable("current folder", Path.cwd()),
+        check_current_folder(),
         check_writable("cache folder", Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")),
         check_captured_data(os.environ.get("WELDSIM_DATA")),
     )
@@ -96,7 +97,10 @@ def check_library(distribution: str) -> Check:
     failure = _failure_of(f"import {module}")
     if failure is None:
         return Check(name=distribution, ok=True, detail=version)
-    return Check(name=distribution, ok=False, detail=f"{version}: {failure}", remedy=remedy_for(distribution, failure))
+    # A word in MUJOCO_GL that this machine has no library for keeps mujoco, and what needs it, from being imported at all.
+    named = os.environ.get("MUJOCO_GL") and _failure_of(f"import os; del os.environ['MUJOCO_GL']; import {module}") is None
+    remedy = _unset_remedy() if named else remedy_for(distribution, failure)
+    return Check(name=distribution, ok=False, detail=f"{version}: {failure}", remedy=remedy)
 
 
 def remedy_for(distribution: str, failure: str) -> str:
@@ -122,13 +126,31 @@ def check_rendering() -> Check:
     backend, *failures = run.stdout.strip().splitlines()
     if backend == "embree":
         why = f" ({'; '.join(failures)})" if failures else ""
-        return Check(name="rendering", ok=True, detail=f"embree: ray casting, no OpenGL{why}", remedy=_GL_REMEDY)
+        remedy = _unset_remedy() if os.environ.get("MUJOCO_GL") else _GL_REMEDY
+        return Check(name="rendering", ok=True, detail=f"embree: ray casting, no OpenGL{why}", remedy=remedy)
     return Check(name="rendering", ok=True, detail=f"{backend}: OpenGL")
 
 
 def _rendering_remedy(failure: str) -> str:
     """What to do where nothing draws."""
-    return "unset MUJOCO_GL" if "MUJOCO_GL" in failure else _GL_REMEDY
+    if found := _SHARED_LIBRARY.search(failure):  # one of the ray caster's own
+        return remedy_for("open3d", found[0])
+    return _unset_remedy() if os.environ.get("MUJOCO_GL") else _GL_REMEDY
+
+
+def _unset_remedy() -> str:
+    """What to do where MUJOCO_GL asks for what is not there."""
+    osmesa = os.environ.get("MUJOCO_GL", "").lower().strip() == "osmesa"
+    return "unset MUJOCO_GL" + (", or sudo apt-get install libosmesa6" if osmesa else "")
+
+
+def check_current_folder() -> Check:
+    """Whether files can be made where the command was started, which may no longer exist."""
+    name = "current folder"
+    try:
+        return check_writable(name, Path.cwd())
+    except OSError as error:
+        return Check(name=name, ok=False, detail=error.strerror or type(error).__name__, remedy="go to a folder that exists")
 
 
 def check_writable(name: str, folder: Path) -> Check:

@@ -1,6 +1,7 @@
 """`weldsim run`, `scan` and `scenes` as their users start them, and the run directory they leave."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -47,6 +48,15 @@ def test_a_run_says_its_verdict_and_leaves_one_folder(welded):
     manifest = json.loads((made / "run.json").read_text())
     assert (manifest["schema"], manifest["scene"], manifest["seed"]) == ("weldsim.run/1", "straight", 1)
     assert set(manifest["files"]) == {path.name for path in made.iterdir()} - {"run.json"}
+
+
+def test_a_platform_that_is_not_there_is_ray_cast(tmp_path):
+    """MuJoCo cannot be imported where MUJOCO_GL names a platform without its library."""
+    command = [sys.executable, "-c", "import sys; from weldsim.cli import main; sys.exit(main())"]
+    words = ["scan", "straight", "--sensor", "exact", "--out", str(tmp_path / "cloud.ply")]
+    env = {**os.environ, "MUJOCO_GL": "osmesa"}
+    done = subprocess.run([*command, *words], capture_output=True, text=True, timeout=300, check=False, env=env)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_the_weld_follows_the_plan_and_the_plan_the_seam(welded):

@@ -121,3 +121,28 @@ def test_ray_casting_counts_only_where_its_library_loads(tmp_path, monkeypatch):
     check = doctor.check_rendering()
     assert not check.ok
     assert "libegl1" in check.remedy
+
+
+def test_a_platform_that_mujoco_cannot_load_is_what_is_blamed(tmp_path, monkeypatch):
+    """mujoco cannot be imported where MUJOCO_GL names a platform without its library; installing it again would not help."""
+    (tmp_path / "plyfile.py").write_text(
+        "import os\nif os.environ.get('MUJOCO_GL') == 'osmesa': raise AttributeError('glGetError')\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    check = doctor.check_library("plyfile")
+    assert not check.ok
+    assert "glGetError" in check.detail
+    assert check.remedy == "unset MUJOCO_GL, or sudo apt-get install libosmesa6"
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    assert doctor.check_library("plyfile").ok
+
+
+def test_a_current_folder_that_is_gone_is_a_failed_check(tmp_path, monkeypatch):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    folder.rmdir()
+    check = doctor.check_current_folder()
+    assert not check.ok
+    assert check.remedy

@@ -52,12 +52,14 @@ def refuse_together(**given: object) -> None:
 def choose_platform() -> str:
     """What draws here, an OpenGL platform or "embree"; MUJOCO_GL is set to the platform where nobody chose one.
 
-    MuJoCo reads it when it is imported, and without it may take a platform that does not draw. Raises SensorError where it
-    holds nonsense.
+    MuJoCo reads it when it is imported, and without it may take a platform that does not draw; one that is not installed
+    keeps it from being imported, so where nothing draws it is set to "disabled". Raises SensorError where it holds nonsense.
     """
     from weldsim.sensor.backend import rendering_backend
 
     platform = rendering_backend()
     if platform != "embree":
         os.environ.setdefault("MUJOCO_GL", platform)
+    else:
+        os.environ["MUJOCO_GL"] = "disabled"
     return platform

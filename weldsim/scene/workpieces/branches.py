@@ -9,9 +9,9 @@ from numpy import ndarray
 
 from weldsim.errors import SceneError
 from weldsim.quantity import Metre, Radian
-from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCurve, Workpiece, edge_places
+from weldsim.scene.workpieces.base import LabelledMesh, SeamCurve
 from weldsim.scene.workpieces.groove import GrooveConfig, GrooveSection, make_section
-from weldsim.scene.workpieces.plate import PlateConfig
+from weldsim.scene.workpieces.plate import FlatPlate, PlateConfig, check_depth
 from weldsim.scene.workpieces.solid import ABOVE, SWEEP_STEP, Surface, block, cut, sweep
 
 
@@ -32,7 +32,7 @@ class BranchesConfig:
 
 @final
 @dataclass(frozen=True)
-class BranchedPlate(Workpiece):
+class BranchedPlate(FlatPlate):
     """A plate with a stem that comes from its edge at -x along y = 0, and two arms that part from it at the junction.
 
     Travel runs up the stem and out along the arms. Each branch is a seam of its own that begins or ends at the junction.
@@ -124,22 +124,6 @@ class BranchedPlate(Workpiece):
         """Whether a branch goes on past this end of it."""
         return self.shape.branches == 1 or not np.allclose(point, [self.shape.junction, 0.0])
 
-    def collision_boxes(self) -> tuple[Box, ...]:
-        return (Box(centre=np.array([0.0, 0.0, -self.plate.thickness / 2]), half=self.plate.half, R=np.eye(3)),)
-
-    @property
-    def base_corners(self) -> Float[ndarray, "k 3"]:
-        x, y, _ = self.plate.half
-        z = -self.plate.thickness
-        return np.array([[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]])
-
-    @property
-    def flat_top(self) -> tuple[float, float]:
-        return self.plate.length, self.plate.width
-
-    def clamp_places(self, count: int) -> tuple[ClampPlace, ...]:
-        return edge_places(count, self.plate.length, self.plate.width, self.plate.thickness)
-
 
 def make_branched_plate(plate: PlateConfig, groove: GrooveConfig, shape: BranchesConfig) -> BranchedPlate:
     """The plate with its Y.
@@ -149,13 +133,7 @@ def make_branched_plate(plate: PlateConfig, groove: GrooveConfig, shape: Branche
             arms too near each other or to the stem, or a branch that ends before it starts.
     """
     plate, section = plate.checked(), make_section(groove)
-    if section.depth >= plate.thickness:
-        raise SceneError(
-            f"groove: depth {section.depth * 1e3:g} mm reaches through the plate, {plate.thickness * 1e3:g} mm thick;"
-            " make the groove shallower or the plate thicker",
-            key="depth",
-            limit=plate.thickness,
-        )
+    check_depth(section, plate)
     if section.width >= plate.width:
         raise SceneError(
             f"groove: width {section.width * 1e3:g} mm is wider than the plate, {plate.width * 1e3:g} mm",

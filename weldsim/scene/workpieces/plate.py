@@ -42,8 +42,8 @@ class PlateConfig:
         return np.array([self.length, self.width, self.thickness]) / 2
 
 
-class _Plate(Workpiece):
-    """What a plate is whether grooved or not."""
+class FlatPlate(Workpiece):
+    """What a plate is whatever is cut into it."""
 
     plate: PlateConfig
 
@@ -67,7 +67,7 @@ class _Plate(Workpiece):
 
 @final
 @dataclass(frozen=True)
-class PlainPlate(_Plate):
+class PlainPlate(FlatPlate):
     """A plate without a seam."""
 
     plate: PlateConfig
@@ -90,7 +90,7 @@ class PlainPlate(_Plate):
 
 @final
 @dataclass(frozen=True)
-class GroovePlate(_Plate):
+class GroovePlate(FlatPlate):
     """A plate with one groove, its cross-section constant and square to the centre line.
 
     Raises (by `make_groove_plate`): SceneError.
@@ -193,13 +193,7 @@ def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: Cen
     """
     plate = plate.checked()
     section = make_section(groove)
-    if section.depth >= plate.thickness:
-        raise SceneError(
-            f"groove: depth {section.depth * 1e3:g} mm reaches through the plate, {plate.thickness * 1e3:g} mm thick;"
-            " make the groove shallower or the plate thicker",
-            key="depth",
-            limit=plate.thickness,
-        )
+    check_depth(section, plate)
     if section.width >= plate.length:
         raise SceneError(
             f"groove: width {section.width * 1e3:g} mm is wider than the plate is long, {plate.length * 1e3:g} mm",
@@ -232,6 +226,17 @@ def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: Cen
             limit=plate.width / 2,
         )
     return part
+
+
+def check_depth(section: GrooveSection, plate: PlateConfig) -> None:
+    """Nothing, when the groove leaves some of the plate under it. Raises SceneError."""
+    if section.depth >= plate.thickness:
+        raise SceneError(
+            f"groove: depth {section.depth * 1e3:g} mm reaches through the plate, {plate.thickness * 1e3:g} mm thick;"
+            " make the groove shallower or the plate thicker",
+            key="depth",
+            limit=plate.thickness,
+        )
 
 
 def _blank(plate: PlateConfig) -> Surface:
