@@ -9,6 +9,7 @@ from itertools import groupby
 import tyro
 
 from weldsim.cli.doctor import Doctor
+from weldsim.cli.dry_run import DryRunCommand
 from weldsim.cli.plan import Plan
 from weldsim.cli.regress import Regress
 from weldsim.cli.run import Run
@@ -20,6 +21,7 @@ COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
     "plan": Plan,
     "run": Run,
     "scan": Scan,
+    "dry-run": DryRunCommand,
     "scenes": Scenes,
     "regress": Regress,
     "doctor": Doctor,

@@ -17,14 +17,14 @@ NEAR = 0.03  # [m] gaps wider than this count as this
 
 @dataclass(frozen=True, kw_only=True)
 class Touch:
-    """Two bodies in contact. Attributes: first, second, their names; depth [m]."""
+    """Two bodies in contact. Attributes: first, second, their names (all in first where they are not told apart); depth [m]."""
 
     first: str
     second: str
     depth: float
 
     def __str__(self) -> str:
-        return f"{self.first} touches {self.second} ({1e3 * self.depth:.1f} mm deep)"
+        return f"{self.first} touches {self.second} ({1e3 * self.depth:.1f} mm deep)" if self.second else self.first
 
 
 class CellCollision:

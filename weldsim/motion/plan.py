@@ -34,6 +34,7 @@ class MotionPlan:
         rail: the tip's line, leads included; `rail.at(s)` is the pose asked for at arc length s.
         position_error, axis_error: greatest distance [m] and angle [rad] of the joint path from the rail.
         slowest: least ratio of planned to asked welding speed; below 1 a joint limit made the weld slower.
+        slowest_at: arc length where [m].
         ramp: length at the ends of the weld in which the torch speeds up and slows down [m].
         dexterity, clearance: least on the way [m/rad], [m].  roll: rotation about the wire at the start [rad].
         notes: one sentence each, for people.
@@ -44,6 +45,7 @@ class MotionPlan:
     position_error: float
     axis_error: float
     slowest: float
+    slowest_at: float
     ramp: float
     dexterity: float
     clearance: float
@@ -95,6 +97,7 @@ def plan_motion(
         position_error=max(piece.position_error for piece in paths),
         axis_error=max(piece.axis_error for piece in paths),
         slowest=slowest,
+        slowest_at=weld.slowest_at,
         ramp=weld.ramp,
         dexterity=float(dexterity(q, X_FT).min()),
         clearance=clearance,

@@ -14,7 +14,7 @@ from numpy import ndarray
 from weldsim.frames import Transform
 from weldsim.kinematics import A2, A3, D5, inverse
 from weldsim.motion.arm import clearances, dexterity
-from weldsim.motion.collision import NEAR, CellCollision
+from weldsim.motion.collision import NEAR, CellCollision, Touch
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rail import Rail
 from weldsim.motion.sweep import Blocked
@@ -27,14 +27,23 @@ SPEEDLESS = 1e-3  # [m] gaps count as at least this
 Why = Literal["unreachable", "singular", "collision"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Refusal:
-    """Why no posture will do at a place. Attributes: why; text, for people; depth [m], of a collision; options, postures tried."""
+    """Why no posture will do at a place.
+
+    Attributes:
+        why: kind.  text: for people.  options: postures tried.
+        q: the posture that comes nearest to doing [rad], None where the place is out of reach.
+        first, second: bodies that collide in it, where they are known.  depth: how deep [m].
+    """
 
     why: Why
     text: str
-    depth: float = 0.0
     options: int = 0
+    q: Float[ndarray, "6"] | None = None
+    first: str = ""
+    second: str = ""
+    depth: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -134,7 +143,7 @@ def _judged(
         near = np.clip(1.0 - free / max(config.clearance, 1e-9), 0.0, 1.0)
         cost[there] = 2.0 * (SHY / np.clip(agile[there], SINGULAR, SHY)) - 2.0 + 20.0 * near
     cost[there & (agile < SINGULAR)] = np.inf
-    touches: dict[tuple[int, ...], tuple[float, str]] = {}
+    touches: dict[tuple[int, ...], Touch] = {}
     if blocked is not None:
         for index in zip(*np.nonzero(np.isfinite(cost)), strict=True):
             found, gap = _touch(q[index], blocked)
@@ -143,30 +152,38 @@ def _judged(
                 touches[tuple(int(i) for i in index)] = found
             else:
                 cost[index] += 0.5 * (NEAR / max(gap, SPEEDLESS) - 1.0)
-    return cost, tuple(_refusal(i, there[i], cost[i], touches) for i in range(len(q)))
+    return cost, tuple(_refusal(i, q[i], cost[i], touches) for i in range(len(q)))
 
 
-def _touch(q: Float[ndarray, "6"], blocked: Blocked) -> tuple[tuple[float, str] | None, float]:
-    """Depth [m] and words of what q touches, or None; and the gap to the nearest body [m]."""
+def _touch(q: Float[ndarray, "6"], blocked: Blocked) -> tuple[Touch | None, float]:
+    """What q touches, or None; and the gap to the nearest body [m]."""
     if isinstance(blocked, CellCollision):
         gap = blocked.gap(q)
-        if gap > 0 and blocked(q) is None:
-            return None, gap
-        touch = blocked.touch(q)
-        return (None if touch is None else (touch.depth, str(touch))), gap
+        return blocked.touch(q), gap
     text = blocked(q)
-    return (None if text is None else (0.0, text)), NEAR
+    return (None if text is None else Touch(first=text, second="", depth=0.0)), NEAR
 
 
 def _refusal(
-    i: int, there: ndarray, cost: Float[ndarray, "r 8"], touches: dict[tuple[int, ...], tuple[float, str]]
+    i: int, q: Float[ndarray, "r 8 6"], cost: Float[ndarray, "r 8"], touches: dict[tuple[int, ...], Touch]
 ) -> Refusal | None:
+    """Why no posture of one place will do, None where one will."""
     if np.isfinite(cost).any():
         return None
+    there = ~np.isnan(q[..., 0])
     if not there.any():
         return Refusal(why="unreachable", text="no joint solution for any rotation about the wire")
-    mine = [found for index, found in touches.items() if index[0] == i]
+    mine = {index[1:]: touch for index, touch in touches.items() if index[0] == i}
     if mine:
-        depth, text = min(mine)
-        return Refusal(why="collision", text=text, depth=depth, options=len(mine))
-    return Refusal(why="singular", text="every joint solution is at a singularity", options=int(there.sum()))
+        index, touch = min(mine.items(), key=lambda item: item[1].depth)
+        return Refusal(
+            why="collision",
+            text=str(touch),
+            options=len(mine),
+            q=q[index],
+            first=touch.first,
+            second=touch.second,
+            depth=touch.depth,
+        )
+    text = "every joint solution is at a singularity"
+    return Refusal(why="singular", text=text, options=int(there.sum()), q=q[there][0])

@@ -26,7 +26,7 @@ class Move:
 
     Attributes:
         segment: what it is.  q, qd, qdd: (k, 6).  s: (k,) [m].  speed: (k,) tip speed along the rail [m/s], 0 in the air.
-        slowest: least ratio of allowed to asked tip speed, 1 where the joints' limits never bite.
+        slowest: least ratio of allowed to asked tip speed, 1 where the joints' limits never bite.  slowest_at: where [m].
         ramp: length in which the tip reaches its speed at either end [m].
     """
 
@@ -37,6 +37,7 @@ class Move:
     s: Float[ndarray, "k"]
     speed: Float[ndarray, "k"]
     slowest: float = 1.0
+    slowest_at: float = 0.0
     ramp: float = 0.0
 
 
@@ -100,6 +101,7 @@ def piece_move(rail: Rail, path: JointPath, config: MotionConfig) -> Move:
         s=s,
         speed=ds,
         slowest=float((limit / asked).min()),
+        slowest_at=float(edges[(limit / asked).argmin()]),
         ramp=min((end - start) / 2, max(_ramp(0.0, float(v), tip) for v in (limit[0], limit[-1]))),
     )
 

@@ -1,0 +1,140 @@
+"""Files that a dry run reads, and what it refuses: one line, naming the place."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.torch_paths import flat_curve, torch_path
+from weldsim.dryrun.read import read_program
+from weldsim.errors import InputError
+from weldsim.frames import Transform, matrix_from_rotation_vector
+from weldsim.mounts import X_FT
+
+POSE = "0.0,-0.45,0.1,3.1,0.0,0.0"
+
+
+def _document(**changes):
+    poses = [{"s": 0.01 * i, "position": [0.01 * i, -0.45, 0.05], "quaternion_wxyz": [0.0, 1.0, 0.0, 0.0]} for i in range(3)]
+    points = [pose["position"] for pose in poses]
+    seam = {"id": "seam-1", "points": points, "poses": poses, "speed": 0.008, **changes}
+    return {"schema": "weldsim.path/1", "frame": "base", "units": {"length": "m", "angle": "rad"}, "seams": [seam]}
+
+
+def _poses(**changes):
+    return [
+        {"s": 0.01 * i, "position": [0.01 * i, -0.45, 0.05], "quaternion_wxyz": [0.0, 1.0, 0.0, 0.0], **changes} for i in range(3)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("tool", ["torch", "tool0"])
+@pytest.mark.parametrize("base", ["controller", "base_link"])
+def test_a_csv_in_either_frame_gives_the_torch_in_the_controllers_base(tmp_path, seed, tool, base):
+    rng = np.random.default_rng(seed)
+    p = np.array([0, -0.5, 0.2]) + 0.1 * rng.normal(size=(8, 3))
+    truth = Transform("BT", matrix_from_rotation_vector(rng.uniform(-1.5, 1.5, (8, 3))), p)
+    said = truth if tool == "torch" else truth @ X_FT.inverse()
+    R, at = said.R, said.p
+    if base == "base_link":
+        turn = np.diag([-1.0, -1.0, 1.0])
+        R, at = turn @ R, at @ turn
+    rows = np.column_stack([at, Transform("BT", R, at).rotation_vector])
+    file = tmp_path / "poses.csv"
+    file.write_text("\n".join(",".join(f"{v:.12f}" for v in row) for row in rows))
+    program = read_program(file, tool=tool, base=base)
+    assert np.abs(program.paths[0].X_BT.p - truth.p).max() < 1e-9
+    assert np.abs(program.paths[0].X_BT.R - truth.R).max() < 1e-8
+    assert not program.paths[0].roll_free
+
+
+def test_a_csv_that_weldsim_wrote_says_its_frame(tmp_path):
+    from weldsim.path.files import write_path_csv
+
+    document = _document()
+    for tool in ("torch", "tool0"):
+        write_path_csv(tmp_path / "w.csv", document, tool=tool)
+        program = read_program(tmp_path / "w.csv")
+        assert np.abs(program.paths[0].X_BT.p - [pose["position"] for pose in document["seams"][0]["poses"]]).max() < 1e-6
+        assert program.notes == ()
+
+
+def test_the_thesis_program_is_tool0_in_the_controllers_base(real_data):
+    program = read_program(real_data / "thesis_paths/ur_y_shape.csv")
+    tips = np.loadtxt(real_data / "thesis_paths/tip_y_shape.csv", delimiter=",")
+    assert np.abs(program.paths[0].X_BT.p * [-1, -1, 1] - tips[:, :3]).max() < 1e-5
+    assert "tool0" in program.notes[0]
+
+
+def test_a_script_is_read_line_by_line(tmp_path):
+    file = tmp_path / "job.script"
+    file.write_text(
+        "def job():\n  set_tcp(p[0, 0.048, 0.227, d2r(-48.7), 0, 0])  # torch\n  home = [-1.57, -1.3, -1.9,\n    -1.5, 1.57, 0]\n"
+        "  v1 = 0.02\n  movej(home, a=1.4, v=1.05)\n  movel(p[0.0, -0.45, 0.1, 3.1, 0, 0], v=v1/2)\n  set_digital_out(0, True)\n"
+        '  movep(p[0.05, -0.45, 0.1, 3.1, 0, 0], 1.2, 0.008)\n  set_digital_out(0, False)\n  textmsg("done, # no")\n  sleep(0.5)\n'
+        "  servoj([-1.57, -1.3, -1.9, -1.5, 1.57, 0], t=0.008, lookahead_time=0.1, gain=300)\nend\njob()\n"
+    )
+    program = read_program(file)
+    assert [m.command for m in program.motions] == ["movej", "movel", "movep", "servoj"]
+    assert [m.line for m in program.motions] == [6, 7, 9, 13]
+    assert [m.arc for m in program.motions] == [False, False, True, False]
+    assert program.motions[1].speed == pytest.approx(0.01)
+    assert program.motions[2].speed == pytest.approx(0.008)
+    assert program.motions[1].X_BT is not None
+    assert np.allclose(program.motions[1].X_BT.p, [0, -0.45, 0.1], atol=1e-4)
+    assert program.pauses == 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("p.json", "{", "is no JSON"),
+        ("p.json", json.dumps({"schema": "other"}), "schema"),
+        ("p.json", json.dumps({**_document(), "seams": []}), "nothing to check"),
+        ("p.json", json.dumps(_document(poses=_poses()[:1])), "1 poses; a path needs two"),
+        ("p.json", json.dumps(_document(poses=_poses(quaternion_wxyz=[0, 1.1, 0, 0]))), "quaternion length"),
+        ("p.json", json.dumps(_document(poses=_poses(position=[float("nan"), 0, 0]))), "not finite"),
+        (
+            "p.json",
+            json.dumps(_document(poses=[{**p, "position": [1e3 * v for v in p["position"]]} for p in _poses()])),
+            "millimetres",
+        ),
+        ("p.csv", "", "0 poses"),
+        ("p.csv", POSE, "1 poses; a path needs two"),
+        ("p.csv", f"{POSE}\n{POSE},1\n", "line 2: 7 columns"),
+        ("p.csv", f"{POSE}\nnan,0,0,0,0,0\n", "line 2"),
+        ("p.csv", f"{POSE}\n12.0,-450.0,100.0,3.1,0,0\n", "millimetres"),
+        ("p.csv", f"{POSE}\n0,-0.45,0.1,180.0,0,0\n", "degrees"),
+        ("p.csv", f"x,y,z,a,b,c\n{POSE}\n{POSE}\n", "column rx"),
+        ("p.script", "def a():\nend\n", "nothing to check"),
+        ("p.script", f"movel(p[{POSE}])", "1 motion"),
+        ("p.script", f"while True:\n movel(p[{POSE}])\nend", "line 1: while"),
+        ("p.script", "movel(p[0,0,0)", "bracket"),
+        ("p.script", "movej([1,2,3])", "six joint angles"),
+        ("p.script", "movej([nan,0,0,0,0,0])", "cannot be read"),
+        ("p.script", "movel(p[0, -450, 100, 0, 0, 0])", "millimetres"),
+        ("p.script", "movej([90, -90, 0, 0, 0, 0])", "degrees"),
+        ("p.script", "movec(p[0,0,0,0,0,0], p[0,0,0,0,0,0])", "movec"),
+        ("p.script", "movej(get_target())", "cannot be read"),
+        ("p.script", "movej([0,0,0,0,0,0], v=-1)", "positive"),
+        ("p.script", "drive around", "no statement"),
+        ("p.docx", "", "is needed"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, name, text, says):
+    file = tmp_path / name
+    file.write_text(text)
+    with pytest.raises(InputError, match=says) as caught:
+        read_program(file)
+    assert "\n" not in str(caught.value)
+    assert caught.value.exit_code == 2
+
+
+def test_a_missing_file_is_one_line(tmp_path):
+    for name in ("a.json", "a.csv", "a.script"):
+        with pytest.raises(InputError, match="cannot be read"):
+            read_program(tmp_path / name)
+
+
+def test_paths_of_tests_have_the_form_that_is_read():
+    assert torch_path(flat_curve("line", 0.1), np.array([0, 0, -1.0])).roll_free

@@ -1,0 +1,176 @@
+"""`weldsim dry-run`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import tyro
+
+from weldsim import units
+from weldsim.cli.options import ConfigOptions, choose_platform, refuse_together
+from weldsim.cli.outputs import check_outputs, check_suffix
+from weldsim.cli.show import print_json, progress, table
+from weldsim.dryrun.program import Base, Tool
+from weldsim.errors import InputError, SensorError
+
+if TYPE_CHECKING:
+    from weldsim.dryrun.cell import Cell
+    from weldsim.dryrun.verdict import DryRun, Trial, Verdict
+
+TOLD = 12  # failures in full
+
+
+@dataclass(frozen=True, kw_only=True)
+class DryRunCommand(ConfigOptions):
+    """Check a path or robot program before anything moves: a verdict per waypoint, what would help, cycle time.
+
+    Exits 1 when it would fail.
+    """
+
+    file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
+    """A path (weldsim.path/1, .json), UR poses (.csv: x y z rx ry rz) or URScript (.script)."""
+
+    scene: str | None = None
+    """What stands around the arm: name of a scene, or a TOML file."""
+
+    empty: bool = False
+    """Arm and table alone (the default)."""
+
+    start: str | None = None
+    """Where the arm stands: six joint angles, "-90 deg, -75 deg, ..." or radians. Default: the scene's last view, or home."""
+
+    tool: Tool | None = None
+    """Which frame the poses of a CSV or script are of: the wire's tip, or the bare flange. Default: what the file says."""
+
+    base: Base = "controller"
+    """In which base a CSV's poses are: the UR controller's, or base_link, which is turned half a turn about z."""
+
+    roll: bool = False
+    """Leave the rotation about the wire of a CSV's poses free."""
+
+    no_fix: bool = False
+    """Do not look for changes that would help."""
+
+    html: Path | None = None
+    """Where to write a page: verdicts, joint plots, a picture of the first failure."""
+
+    out: Path | None = None
+    """Where to write the dry run as JSON."""
+
+    png: Path | None = None
+    """Where to write the picture of the first failure."""
+
+    def __call__(self) -> int:
+        """0 where the job would pass, else 1."""
+        refuse_together(scene=self.scene, empty=self.empty or None)
+        check_suffix(self.html, (".html",), "a page")
+        check_suffix(self.png, (".png",), "a picture")
+        check_suffix(self.out, (".json",), "a dry run")
+        check_outputs((self.html, self.out, self.png), (self.config, self.file))
+        config, q_start = self.cell(), None if self.start is None else joint_angles(self.start)
+
+        from weldsim.dryrun.read import read_program
+        from weldsim.dryrun.run import dry_run
+
+        program = read_program(
+            self.file, tool=self.tool, base=self.base, speed=config.path.speed, roll_free=True if self.roll else None
+        )
+        if self.html is not None or self.png is not None:
+            choose_platform()
+        with progress() as tell:
+            cell = self._cell(q_start)
+            result = dry_run(program, cell, config.motion, fix=not self.no_fix, tell=tell)
+            written, trouble = self._write(result, cell)
+        if self.json:
+            from weldsim.dryrun.verdict import dry_run_json
+
+            print_json({**dry_run_json(result), "written": [str(path) for path in written]})
+        else:
+            self._print(result, written, trouble)
+        return 0 if result.passed else 1
+
+    def _cell(self, q_start: Any) -> "Cell":
+        from weldsim.dryrun.cell import empty_cell, scene_cell
+
+        return empty_cell(q_start) if self.scene is None else scene_cell(self.scene_of(self.scene), q_start)
+
+    def _write(self, result: "DryRun", cell: "Cell") -> tuple[list[Path], str]:
+        """What was written, and why a picture was not."""
+        import json
+
+        from weldsim.dryrun.verdict import dry_run_json
+        from weldsim.output import write_whole
+
+        written, trouble = [], ""
+        pictures: tuple[bytes | None, ...] = (None,) * len(result.trials)
+        if self.html is not None or self.png is not None:
+            try:
+                pictures = tuple(
+                    None if trial.passed and self.png is None else self._picture(trial, cell) for trial in result.trials
+                )
+            except SensorError as error:
+                trouble = str(error)
+        if self.html is not None:
+            from weldsim.dryrun.page import write_page
+
+            written.append(write_page(self.html, result, pictures))
+        if self.png is not None:
+            failed = next((i for i, trial in enumerate(result.trials) if not trial.passed), 0)
+            if (png := pictures[failed]) is not None:
+                written.append(write_whole(self.png, png))
+        if self.out is not None:
+            written.append(write_whole(self.out, json.dumps(dry_run_json(result), indent=1, allow_nan=False) + "\n"))
+        return written, trouble
+
+    def _picture(self, trial: "Trial", cell: "Cell") -> bytes:
+        from weldsim.dryrun.picture import picture
+
+        return picture(trial, cell)
+
+    def _print(self, result: "DryRun", written: list[Path], trouble: str) -> None:
+        from weldsim.dryrun.verdict import runs
+
+        word = f"would pass, cycle time {result.cycle:.1f} s" if result.passed else "WOULD FAIL"
+        print(f"{result.source} in the cell {result.cell}: {word}")
+        for note in result.notes:
+            print(f"  {note}")
+        for trial, fixes in zip(result.trials, result.fixes, strict=True):
+            bad = [(a, b) for a, b in runs(trial.verdicts) if not a.ok]
+            state = f"{trial.cycle:.1f} s" if trial.passed else "fails"
+            print(f"  {trial.name}: {len(trial.verdicts)} waypoints, {units.to_mm(trial.length):.0f} mm, {state}")
+            rows = [_row(a, b) for a, b in bad[:TOLD]]
+            if rows:
+                print(table(rows, ("waypoint", "s", "verdict", "reason")))
+            for fix in fixes:
+                print(f"  would pass: {fix.text}")
+            if bad and not fixes and not self.no_fix:
+                print("  no change that was tried would help")
+            for note in trial.notes:
+                print(f"  {note}")
+        if trouble:
+            print(f"  {trouble}")
+        for path in written:
+            print(f"  wrote {path}")
+
+
+def _row(first: "Verdict", last: "Verdict") -> list[str]:
+    """One line of the table of failures."""
+    span = first.label if first.index == last.index else f"{first.label} to {last.index}"
+    return [span, "" if first.s is None else f"{units.to_mm(first.s):.1f} mm", first.why, first.text]
+
+
+def joint_angles(text: str) -> Any:
+    """Six joint angles [rad] from text. Raises InputError."""
+    parts = [part.strip() for part in text.replace(";", ",").split(",")]
+    if len(parts) != 6:
+        raise InputError(f"--start {text!r}: {len(parts)} values, six joint angles are needed, separated by commas", value=text)
+    angles = []
+    for part in parts:
+        try:
+            angles.append(float(part))
+        except ValueError:
+            angles.append(units.parse(part, "rad"))
+    if not np.isfinite(angles).all():
+        raise InputError(f"--start {text!r}: an angle is not finite", value=text)
+    return np.array(angles)

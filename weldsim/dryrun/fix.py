@@ -1,0 +1,200 @@
+"""The nearest change after which a job passes: tried on a coarse look first, then applied and the whole job checked again."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.dryrun.cell import Cell, shifted
+from weldsim.dryrun.program import Program
+from weldsim.dryrun.try_path import FASTEST, quick, try_path
+from weldsim.dryrun.try_script import try_script
+from weldsim.dryrun.verdict import Fix, Trial
+from weldsim.errors import MotionError
+from weldsim.frames import Transform
+from weldsim.motion.config import MotionConfig
+from weldsim.motion.rungs import turned
+from weldsim.records import TorchPath
+
+TURNS = np.deg2rad([s * a for a in (5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 105, 120, 135, 150, 165, 180) for s in (1, -1)])
+DISTANCES = (0.01, 0.02, 0.03, 0.05, 0.075, 0.10, 0.15, 0.20, 0.25, 0.30, 0.40, 0.50)  # [m] the part is moved by, tried in order
+HEADINGS = 12  # directions on the table
+CLOSE = 0.005  # [m] to which the nearest place that does is found
+TABLE = np.array([[-0.60, -0.84], [0.60, 0.20]])  # [m] the table top in B
+FULL_TRIES = 4  # whole checks of changes that passed the coarse look
+
+Progress = Callable[[float], None]
+
+
+def fixes_for_path(
+    path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell: Progress = lambda done: None
+) -> tuple[Fix, ...]:
+    """What would help a path that failed: a slower weld, a turn about the wire, a place for the part, cuts; all verified."""
+    failure = trial.failure
+    if failure is None or failure.why in ("stale start", "orientation jump"):
+        return ()
+    if failure.why == "speed":
+        return _slower(path, trial, cell, config)
+    found = []
+    if not path.roll_free:
+        found += _turn(path, trial, cell, config)
+    found += _move(path, trial, cell, config, tell)
+    found += _cut(path, trial, cell, config)
+    return tuple(found)
+
+
+def _slower(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> tuple[Fix, ...]:
+    speed = 0.99 * min(float(path.speed.max()), FASTEST) * (trial.slowest or 1.0)
+    for _ in range(FULL_TRIES):
+        tried = try_path(_with(path, speed=np.minimum(path.speed, speed)), trial.name, cell, config)
+        if tried.passed:
+            return (Fix(kind="slower", text=f"weld at {1e3 * speed:.0f} mm/s at most", speed=speed),)
+        speed *= 0.95 * (tried.slowest or 0.5)
+    return ()
+
+
+def _turn(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
+    tries = 0
+    for turn in TURNS:
+        changed = _with(path, X_BT=turned_about_wire(path.X_BT, float(turn)))
+        if not _quick(changed, cell, config):
+            continue
+        if try_path(changed, trial.name, cell, config).passed:
+            text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg all along"
+            return [Fix(kind="turn about the wire", text=text, turn=float(turn))]
+        if (tries := tries + 1) >= FULL_TRIES:
+            break
+    return []
+
+
+def _move(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell: Progress) -> list[Fix]:
+    tries = 0
+    for k, move in enumerate(candidates(path.X_BT.p)):
+        tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
+        if not _quick(_with(path, X_BT=shifted(path.X_BT, move)), cell.moved(move), config):
+            continue
+        move = _nearest(path, move, cell, config)
+        for scale in (1.0, 1.0 + 0.01 / float(np.linalg.norm(move)), 1.0 + 0.03 / float(np.linalg.norm(move))):
+            if passes(path, scale * move, trial.name, cell, config):
+                return [moved_fix(scale * move)]
+        if (tries := tries + 1) >= FULL_TRIES:
+            break
+    return []
+
+
+def moved_fix(move: Float[ndarray, "3"]) -> Fix:
+    """The change of place in words."""
+    x, y = 1e3 * move[0], 1e3 * move[1]
+    distance = 1e3 * float(np.linalg.norm(move))
+    text = f"move the part by {distance:.0f} mm: ({x:+.0f}, {y:+.0f}) mm along x and y of the base"
+    return Fix(kind="move the part", text=text, move=(float(move[0]), float(move[1]), float(move[2])))
+
+
+def passes(path: TorchPath, move: Float[ndarray, "3"], name: str, cell: Cell, config: MotionConfig) -> bool:
+    """Whether the whole check passes with the part moved [m]."""
+    return try_path(_with(path, X_BT=shifted(path.X_BT, move)), name, cell.moved(move), config).passed
+
+
+def candidates(points_B: Float[ndarray, "n 3"]) -> Iterator[Float[ndarray, "3"]]:
+    """Moves on the table [m], near ones first, towards the middle of the arm's reach first; a seam over the table stays there."""
+    middle = points_B.mean(axis=0)
+    over = _over_table(points_B[:, :2])
+    inwards = np.arctan2(-0.45 - middle[1], -middle[0])
+    for distance in DISTANCES:
+        for k in sorted(range(HEADINGS), key=lambda k: min(k, HEADINGS - k)):
+            heading = inwards + 2 * np.pi * k / HEADINGS
+            move = distance * np.array([np.cos(heading), np.sin(heading), 0.0])
+            if not over or _over_table(points_B[:, :2] + move[:2]):
+                yield move
+
+
+def _over_table(points: Float[ndarray, "n 2"]) -> bool:
+    return bool((points >= TABLE[0]).all() and (points <= TABLE[1]).all())
+
+
+def _nearest(path: TorchPath, move: Float[ndarray, "3"], cell: Cell, config: MotionConfig) -> Float[ndarray, "3"]:
+    """The shortest move in the same direction that the coarse look finds good, to CLOSE."""
+    length = float(np.linalg.norm(move))
+    low = max((d for d in DISTANCES if d < length - 1e-9), default=0.0)
+    high = length
+    while high - low > CLOSE:
+        middle = (low + high) / 2
+        trying = move * middle / length
+        good = _quick(_with(path, X_BT=shifted(path.X_BT, trying)), cell.moved(trying), config)
+        low, high = (low, middle) if good else (middle, high)
+    return move * high / length
+
+
+def _cut(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
+    """The weld in pieces, where the search for a sweep said that this would help."""
+    if not trial.split:
+        return []
+    edges = [float(path.s[0]), *trial.split, float(path.s[-1])]
+    for a, b in pairwise(edges):
+        mine = np.flatnonzero((path.s >= a - 1e-9) & (path.s <= b + 1e-9))
+        if len(mine) < 2 or not try_path(piece(path, mine), trial.name, cell, config).passed:
+            return []
+    where = ", ".join(f"{1e3 * s:.0f}" for s in trial.split)
+    return [Fix(kind="cut the weld", text=f"weld it in {len(edges) - 1} pieces, cut at s = {where} mm", cut=trial.split)]
+
+
+def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress = lambda done: None) -> tuple[Fix, ...]:
+    """What would help a program that failed at a pose: the same turn about the wire at every pose, or the part elsewhere."""
+    failure = trial.failure
+    if failure is None or failure.why in ("stale start", "speed") or all(motion.X_BT is None for motion in program.motions):
+        return ()
+    found = []
+    for turn in TURNS:
+        if try_script(_changed(program, turn=float(turn)), cell).passed:
+            text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg at every pose"
+            found.append(Fix(kind="turn about the wire", text=text, turn=float(turn)))
+            break
+    points = np.stack([motion.X_BT.p for motion in program.motions if motion.X_BT is not None])
+    for k, move in enumerate(candidates(points)):
+        tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
+        if try_script(_changed(program, move=move), cell.moved(move)).passed:
+            found.append(moved_fix(move))
+            break
+    return tuple(found)
+
+
+def _changed(program: Program, turn: float = 0.0, move: Float[ndarray, "3"] | None = None) -> Program:
+    """The program with every pose turned about the wire and moved; joint targets stay."""
+    shift = np.zeros(3) if move is None else move
+    motions = tuple(
+        motion if motion.X_BT is None else replace(motion, X_BT=shifted(turned_about_wire(motion.X_BT, turn), shift))
+        for motion in program.motions
+    )
+    return replace(program, motions=motions)
+
+
+def turned_about_wire(X_BT: Transform, turn: float) -> Transform:
+    """The poses turned about their own z [rad]."""
+    return Transform("BT", turned(X_BT.R, turn), X_BT.p)
+
+
+def piece(path: TorchPath, mine: ndarray) -> TorchPath:
+    """Some neighbouring poses of a path, as a path."""
+    return _with(
+        path,
+        X_BT=Transform("BT", path.X_BT.R[mine], path.X_BT.p[mine]),
+        s=path.s[mine],
+        speed=path.speed[mine],
+        arc_on=path.arc_on[mine],
+        segments=tuple(path.segments[i] for i in mine),
+        sigma=None if path.sigma is None else path.sigma[mine],
+    )
+
+
+def _quick(path: TorchPath, cell: Cell, config: MotionConfig) -> bool:
+    try:
+        return cell.collision(cell.q_start) is None and quick(path, cell, config)
+    except MotionError:
+        return False
+
+
+def _with(path: TorchPath, **changes: object) -> TorchPath:
+    return replace(path, **changes)  # type: ignore[arg-type]

@@ -1,0 +1,40 @@
+"""A whole dry run: every path or motion of a program tried in a cell, and fixes looked for where one fails."""
+
+from collections.abc import Callable
+
+from weldsim.dryrun.cell import Cell
+from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
+from weldsim.dryrun.program import Program
+from weldsim.dryrun.try_path import try_path
+from weldsim.dryrun.try_script import try_script
+from weldsim.dryrun.verdict import DryRun
+from weldsim.motion.config import MotionConfig
+
+
+def dry_run(
+    program: Program,
+    cell: Cell,
+    config: MotionConfig | None = None,
+    *,
+    fix: bool = True,
+    tell: Callable[[str, float | None], None] = lambda stage, done: None,
+) -> DryRun:
+    """What would become of a program in a cell, without anything moving.
+
+    Args:
+        program: as `read_program` gives it.  cell: what stands around the arm, and where the arm stands.
+        config: of motion planning, for paths.
+        fix: whether to look for changes that help.  tell: told what is being done.
+    """
+    config = config or MotionConfig()
+    trials, fixes = [], []
+    if program.kind == "script":
+        tell("program", None)
+        trials.append(try_script(program, cell))
+        fixes.append(fixes_for_script(program, trials[0], cell, lambda done: tell("fixes", done)) if fix else ())
+    for path, name in zip(program.paths, program.names, strict=True):
+        tell(name, None)
+        trial = try_path(path, name, cell, config)
+        trials.append(trial)
+        fixes.append(fixes_for_path(path, trial, cell, config, lambda done: tell("fixes", done)) if fix else ())
+    return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=program.notes)

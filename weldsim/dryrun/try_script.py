@@ -1,0 +1,218 @@
+"""A robot program tried: each motion as the controller would make it, in the branch the arm is in."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.dryrun.cell import Cell
+from weldsim.dryrun.program import Motion, Program
+from weldsim.dryrun.try_path import FASTEST
+from weldsim.dryrun.verdict import Trial, Verdict, Why
+from weldsim.frames import Transform, rotation_vector_from_matrix, slerp
+from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, SPEED_LIMIT, inverse, torch_pose
+from weldsim.motion.arm import dexterity
+from weldsim.motion.rungs import SINGULAR
+from weldsim.motion.sweep import STEP_LENGTH, STEP_TURN, first_touch
+from weldsim.mounts import X_FT
+
+HOP = 0.35  # [rad] a joint that turns further within one step of a straight line has jumped
+STALE = np.deg2rad(0.5)  # [rad] how far a servoj may begin from where the arm stands
+SERVO_JUMP = 0.1  # [rad] between two servoj targets
+TURNING = 1.05  # [rad/s] of the tool's rotation where a straight motion turns more than it travels
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Way:
+    """A motion as sampled. Attributes: q (n, 6) [rad], as far as it goes; duration [s]; why and text of its failure; at, the index
+    of the sample that fails."""
+
+    q: Float[ndarray, "n 6"]
+    duration: float
+    why: Why = "ok"
+    text: str = ""
+    at: int = 0
+
+
+def try_script(program: Program, cell: Cell) -> Trial:
+    """A verdict for every motion of the program, the arm starting where the cell has it; what follows a failure is not reached."""
+    q = np.array(cell.q_start, float)
+    verdicts: list[Verdict] = []
+    t, rows, arc, clock = [np.zeros(1)], [q[None]], [np.zeros(1, bool)], 0.0
+    q_worst, p_worst, length = None, None, 0.0
+    over = np.abs(q) > JOINT_LIMIT
+    start = f"where the arm stands {touch}" if (touch := cell.collision(q)) is not None else ""
+    if over.any():
+        start = f"the arm is said to stand with {JOINT_NAMES[int(np.flatnonzero(over)[0])]} beyond +-360 deg"
+    for index, motion in enumerate(program.motions):
+        verdict = Verdict(label=f"line {motion.line} {motion.command}", index=index, s=length)
+        if verdicts and not verdicts[-1].ok:
+            verdicts.append(replace(verdict, why="not reached", text="the program has failed before"))
+            continue
+        if index == 0 and start:
+            verdicts.append(replace(verdict, why="stale start", text=f"{start}; say where it really stands (--start)"))
+            q_worst, p_worst = q, torch_pose(q).p
+            continue
+        way = _way(motion, q, index == 0 or program.motions[index - 1].command != "servoj")
+        why, text, at, first, second, depth = way.why, way.text, way.at, "", "", 0.0
+        found = first_touch(way.q, cell.collision) if len(way.q) > 1 else None
+        if found is not None and (why == "ok" or found[0] <= at):
+            at = min(int(np.ceil(found[0])), len(way.q) - 1)
+            q_hit = way.q[at - 1] + (found[0] - at + 1) * (way.q[at] - way.q[at - 1]) if at else way.q[0]
+            hit = cell.collision.touch(q_hit)
+            why, text = "collision", f"{found[1]}, {100 * found[0] / (len(way.q) - 1):.0f} % of the way"
+            if hit is not None:
+                first, second, depth = hit.first, hit.second, hit.depth
+            q_worst = q_hit
+        verdicts.append(replace(verdict, why=why, text=text, first=first, second=second, depth=depth))
+        tips = torch_pose(way.q).p
+        length += float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())
+        if why != "ok":
+            q_worst = way.q[min(at, len(way.q) - 1)] if q_worst is None else q_worst
+            p_worst = torch_pose(q_worst).p if motion.X_BT is None or why == "collision" else motion.X_BT.p
+        else:
+            t.append(clock + np.linspace(0, way.duration, len(way.q))[1:])
+            rows.append(way.q[1:])
+            arc.append(np.full(len(way.q) - 1, motion.arc))
+            clock += way.duration
+            q = way.q[-1]
+    all_q = np.concatenate(rows)
+    passed = all(verdict.ok for verdict in verdicts)
+    return Trial(
+        name=program.source,
+        verdicts=tuple(verdicts),
+        t=np.concatenate(t),
+        q=all_q,
+        arc_on=np.concatenate(arc),
+        cycle=clock + program.pauses if passed else 0.0,
+        q_worst=q_worst,
+        p_worst=p_worst,
+        points_B=torch_pose(all_q).p if len(all_q) > 1 else np.zeros((0, 3)),
+        length=length,
+    )
+
+
+def _way(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
+    """The motion from q; `fresh` where no servoj came before it."""
+    if motion.command == "servoj":
+        return _servo(motion, q, fresh)
+    if motion.command == "movej":
+        return _joint_move(motion, q)
+    return _straight(motion, q)
+
+
+def _servo(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
+    target = motion.q if motion.q is not None else _near(motion.X_BT, q)
+    if target is None:
+        return _Way(q=q[None], duration=0.0, why="unreachable", text=_unreached(motion))
+    step = np.abs(target - q)
+    joint = int(step.argmax())
+    way = np.linspace(q, target, max(2, int(step.max() / STEP_TURN) + 2))
+    name, turn = JOINT_NAMES[joint], np.rad2deg(step[joint])
+    if np.abs(target).max() > JOINT_LIMIT:
+        return _beyond(way, target, motion.t)
+    if fresh and step[joint] > STALE:
+        text = f"servoj begins {turn:.1f} deg of {name} away from where the arm stands (limit {np.rad2deg(STALE):.1f} deg)"
+        return _Way(q=way, duration=motion.t, why="stale start", text=f"{text}; movej there first", at=len(way) - 1)
+    if step[joint] > SERVO_JUMP:
+        text = f"{name} jumps {turn:.1f} deg to this target (limit {np.rad2deg(SERVO_JUMP):.1f} deg)"
+        return _Way(q=way, duration=motion.t, why="joint jump", text=text, at=len(way) - 1)
+    if step[joint] / motion.t > SPEED_LIMIT:
+        text = f"{name} would need {np.rad2deg(step[joint] / motion.t):.0f} deg/s (limit {np.rad2deg(SPEED_LIMIT):.0f} deg/s)"
+        return _Way(q=way, duration=motion.t, why="speed", text=text, at=len(way) - 1)
+    return _Way(q=way, duration=motion.t)
+
+
+def _joint_move(motion: Motion, q: Float[ndarray, "6"]) -> _Way:
+    target = motion.q if motion.q is not None else _near(motion.X_BT, q)
+    if target is None:
+        return _Way(q=q[None], duration=0.0, why="unreachable", text=_unreached(motion))
+    turn = float(np.abs(target - q).max())
+    way = np.linspace(q, target, max(2, int(turn / STEP_TURN) + 2))
+    duration = motion.t or _trapezoid(turn, motion.speed, motion.acceleration)
+    if np.abs(target).max() > JOINT_LIMIT:
+        return _beyond(way, target, duration)
+    fastest = turn / duration if motion.t else motion.speed
+    if turn > 1e-6 and fastest > SPEED_LIMIT + 1e-6:
+        text = f"{np.rad2deg(fastest):.0f} deg/s asked for (limit {np.rad2deg(SPEED_LIMIT):.0f} deg/s)"
+        return _Way(q=way, duration=duration, why="speed", text=text)
+    return _Way(q=way, duration=duration)
+
+
+def _straight(motion: Motion, q: Float[ndarray, "6"]) -> _Way:
+    """movel, movep: the tip on a straight line, the orientation turning evenly, the arm in the branch it is in."""
+    begin = torch_pose(q)
+    end = motion.X_BT if motion.X_BT is not None else torch_pose(motion.q)  # type: ignore[arg-type]
+    length = float(np.linalg.norm(end.p - begin.p))
+    turn = float(np.linalg.norm(rotation_vector_from_matrix(begin.R.T @ end.R)))
+    n = max(1, int(np.ceil(max(length / STEP_LENGTH, turn / STEP_TURN))))
+    u = np.linspace(0.0, 1.0, n + 1)
+    R = slerp(np.tile(begin.quaternion, (n + 1, 1)), np.tile(end.quaternion, (n + 1, 1)), u)
+    X_BT = Transform.from_quaternion("BT", R, begin.p + u[:, None] * (end.p - begin.p))
+    fastest = motion.speed if not motion.t else length / motion.t
+    duration = motion.t or max(
+        _trapezoid(length, motion.speed, motion.acceleration),
+        _trapezoid(turn, TURNING, 4 * TURNING) if turn > length / 0.1 else 0.0,
+    )
+    way = [q]
+    for i in range(1, n + 1):
+        done = f"{1e3 * u[i] * length:.1f} of {1e3 * length:.1f} mm"
+        found = _near(X_BT[i], way[-1])
+        if found is None:
+            return _Way(
+                q=np.array(way), duration=0.0, why="unreachable", text=f"{_unreached(motion, X_BT.p[i])}, after {done}", at=i
+            )
+        step = np.abs(found - way[-1])
+        joint = int(step.argmax())
+        if step[joint] > HOP:
+            singular = float(dexterity(found[None])[0]) < 2 * SINGULAR or float(dexterity(way[-1][None])[0]) < 2 * SINGULAR
+            text = f"{JOINT_NAMES[joint]} would turn {np.rad2deg(step[joint]):.0f} deg at once after {done}"
+            why: Why = "singular" if singular else "joint jump"
+            return _Way(q=np.array(way), duration=0.0, why=why, text=text, at=i)
+        if np.abs(found).max() > JOINT_LIMIT:
+            return replace(_beyond(np.array(way), found, 0.0), at=i)
+        way.append(found)
+    out = _Way(q=np.array(way), duration=duration)
+    if motion.arc and fastest > FASTEST:
+        return replace(out, why="speed", text=f"{1e3 * fastest:.0f} mm/s with the arc on (limit {1e3 * FASTEST:.0f} mm/s)")
+    rates = np.abs(np.diff(out.q, axis=0)) * n / max(duration, 1e-9)
+    if length > 1e-6 and not motion.t:
+        rates = np.abs(np.diff(out.q, axis=0)) * n / max(length, 1e-9) * min(motion.speed, np.sqrt(motion.acceleration * length))
+    i, joint = (int(k) for k in np.unravel_index(rates.argmax(), rates.shape))
+    if rates[i, joint] > SPEED_LIMIT:
+        text = (
+            f"{JOINT_NAMES[joint]} would need {np.rad2deg(rates[i, joint]):.0f} deg/s (limit {np.rad2deg(SPEED_LIMIT):.0f} deg/s)"
+        )
+        near = float(dexterity(out.q[i][None])[0]) < 3 * SINGULAR
+        return replace(out, why="singular" if near else "speed", text=text, at=i)
+    return out
+
+
+def _near(X_BT: Transform | None, q: Float[ndarray, "6"]) -> Float[ndarray, "6"] | None:
+    """The joint solution of a torch pose nearest to q, whole turns chosen freely; None where there is none."""
+    if X_BT is None:
+        return None
+    solutions = inverse(X_BT @ X_FT.inverse())
+    if len(solutions) == 0:
+        return None
+    solutions = solutions + 2 * np.pi * np.round((q - solutions) / (2 * np.pi))
+    return solutions[np.abs(solutions - q).max(axis=1).argmin()]
+
+
+def _beyond(way: Float[ndarray, "n 6"], target: Float[ndarray, "6"], duration: float) -> _Way:
+    joint = int(np.abs(target).argmax())
+    text = f"{JOINT_NAMES[joint]} would have to go to {np.rad2deg(target[joint]):.0f} deg (limit +-360 deg)"
+    return _Way(q=way, duration=duration, why="joint limit", text=text, at=len(way) - 1)
+
+
+def _unreached(motion: Motion, p: Float[ndarray, "3"] | None = None) -> str:
+    p = p if p is not None else (motion.X_BT.p if motion.X_BT is not None else np.full(3, np.nan))
+    return f"no joint solution for the torch at ({p[0]:.3f}, {p[1]:.3f}, {p[2]:.3f}) m in base"
+
+
+def _trapezoid(distance: float, speed: float, acceleration: float) -> float:
+    """Time [s] from rest to rest over a distance."""
+    if distance <= speed**2 / acceleration:
+        return 2 * float(np.sqrt(max(distance, 0.0) / acceleration))
+    return distance / speed + speed / acceleration

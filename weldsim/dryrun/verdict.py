@@ -1,0 +1,167 @@
+"""What a dry run says: a verdict for every waypoint, the first failure, fixes that were tried, the motion if there is one."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+Why = Literal[
+    "ok",
+    "unreachable",
+    "joint limit",
+    "singular",
+    "collision",
+    "orientation jump",
+    "speed",
+    "joint jump",
+    "stale start",
+    "not reached",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What becomes of one waypoint.
+
+    Attributes:
+        label: which one, for people.  index: from 0.  s: arc length [m], or None for a joint target.
+        why: "ok" or the kind of failure.  text: the reason in full, with values and limits.
+        first, second: bodies that collide.  depth: how deep [m].
+    """
+
+    label: str
+    index: int
+    s: float | None
+    why: Why = "ok"
+    text: str = ""
+    first: str = ""
+    second: str = ""
+    depth: float = 0.0
+
+    @property
+    def ok(self) -> bool:
+        return self.why == "ok"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fix:
+    """A change after which the job passes: it was applied and the whole job checked again.
+
+    Attributes:
+        kind: what is changed.  text: the change in words.
+        turn: about the wire [rad].  move: of the part, in the base [m].  speed: of the weld [m/s].  cut: arc lengths [m].
+    """
+
+    kind: Literal["turn about the wire", "move the part", "slower", "cut the weld"]
+    text: str
+    turn: float = 0.0
+    move: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    speed: float = 0.0
+    cut: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trial:
+    """One path or program tried.
+
+    Attributes:
+        name: of the seam or program.  verdicts: one a waypoint.
+        t, q: the planned motion as far as there is one [s], [rad]; empty arrays where there is none.
+        arc_on: when the arc burns.  cycle: time it takes [s], 0 where it cannot be done.
+        q_worst: joint angles at the first failure, to be drawn; None where no posture gets there.  p_worst: its place in B [m].
+        points_B: the tip's way, to be drawn.  notes: what else is worth knowing.  length: of the tip's way [m].
+        split: where cutting the weld would help [m].  slowest: least ratio of possible to asked speed, 0 where it is not known.
+    """
+
+    name: str
+    verdicts: tuple[Verdict, ...]
+    t: Float[ndarray, "k"] = field(default_factory=lambda: np.zeros(0))
+    q: Float[ndarray, "k 6"] = field(default_factory=lambda: np.zeros((0, 6)))
+    arc_on: ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    cycle: float = 0.0
+    q_worst: Float[ndarray, "6"] | None = None
+    p_worst: Float[ndarray, "3"] | None = None
+    points_B: Float[ndarray, "n 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    notes: tuple[str, ...] = ()
+    length: float = 0.0
+    split: tuple[float, ...] = ()
+    slowest: float = 0.0
+
+    @property
+    def passed(self) -> bool:
+        return all(verdict.ok for verdict in self.verdicts)
+
+    @property
+    def failure(self) -> Verdict | None:
+        """The first verdict that is not ok."""
+        return next((verdict for verdict in self.verdicts if not verdict.ok), None)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DryRun:
+    """A whole dry run. Attributes: source, cell, what was checked against what; trials; fixes, one tuple a trial; notes."""
+
+    source: str
+    cell: str
+    trials: tuple[Trial, ...]
+    fixes: tuple[tuple[Fix, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        return all(trial.passed for trial in self.trials)
+
+    @property
+    def cycle(self) -> float:
+        """Time of all trials together [s]."""
+        return sum(trial.cycle for trial in self.trials)
+
+
+def runs(verdicts: tuple[Verdict, ...]) -> list[tuple[Verdict, Verdict]]:
+    """First and last of each run of neighbouring verdicts of one kind with the same bodies; the first with the greatest depth."""
+    out: list[tuple[Verdict, Verdict]] = []
+    for verdict in verdicts:
+        if out and (out[-1][0].why, out[-1][0].first, out[-1][0].second) == (verdict.why, verdict.first, verdict.second):
+            out[-1] = (replace(out[-1][0], depth=max(out[-1][0].depth, verdict.depth)), verdict)
+        else:
+            out.append((verdict, verdict))
+    return out
+
+
+def dry_run_json(result: DryRun) -> dict[str, Any]:
+    """The dry run as one JSON object: SI units; waypoints as ranges `from` to `to` of one verdict, all of them covered."""
+    return {
+        "schema": "weldsim.dry-run/1",
+        "source": result.source,
+        "cell": result.cell,
+        "passed": result.passed,
+        "cycle_time": round(result.cycle, 6),
+        "notes": list(result.notes),
+        "trials": [_trial_json(trial, fixes) for trial, fixes in zip(result.trials, result.fixes, strict=True)],
+    }
+
+
+def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
+    failure = trial.failure
+    return {
+        "name": trial.name,
+        "passed": trial.passed,
+        "cycle_time": round(trial.cycle, 6),
+        "length": round(trial.length, 9),
+        "waypoints": [
+            {"from": a.index, "to": b.index, "s": [a.s, b.s], **_verdict_json(a), "label": a.label} for a, b in runs(trial.verdicts)
+        ],
+        "first_failure": None if failure is None else {"index": failure.index, "s": failure.s, **_verdict_json(failure)},
+        "fixes": [
+            {"kind": fix.kind, "text": fix.text, "turn": fix.turn, "move": list(fix.move), "speed": fix.speed, "cut": list(fix.cut)}
+            for fix in fixes
+        ],
+        "notes": list(trial.notes),
+    }
+
+
+def _verdict_json(verdict: Verdict) -> dict[str, Any]:
+    bodies = {"bodies": [verdict.first, verdict.second], "depth": verdict.depth} if verdict.first else {}
+    return {"verdict": verdict.why, "reason": verdict.text, **bodies}
