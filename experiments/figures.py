@@ -71,6 +71,30 @@ ROWS = {
     "coverage": Row("share of the true seam that the path covers, least of all seeds", ("least",), "%", (0.95,), True, 1),
     "wire_axis": Row("wire axis from the true bisector: median / p95", ("median", "p95"), "deg", (radians(1.5), radians(4))),
     "phantoms": Row("seams found in a plain clamped plate, 20 seeds", ("count",), "", (0,), decimals=0),
+    **{
+        f"plan_{scene}": Row(
+            f"planned path from the true seam, {name}, worst of 10 seeds, bare and clamped: mean / max",
+            ("mean", "max"),
+            "mm",
+            limits,
+        )
+        for scene, name, limits in (
+            ("cylinder", "cylinder", (0.5e-3, 1.5e-3)),
+            ("cuboid", "cuboid over three faces", (0.7e-3, 2.0e-3)),
+            ("y", "Y, stem alone", (0.7e-3, 2.0e-3)),
+            ("y_branches", "Y, three branches", (0.7e-3, 2.0e-3)),
+        )
+    },
+    "five_coverage": Row("share of the true seam covered, all six scenes, least of 10 seeds", ("least",), "%", (0.95,), True, 1),
+    "five_iou": Row("overlap of the groove region found with the true one (IoU), least", ("least",), "", (0.85,), True),
+    "five_phantoms": Row("seams found in those scenes where there is none", ("count",), "", (0,), decimals=0),
+    "five_stereo": Row(
+        "the six scenes by the reference D415, one seed: largest error over the limit that the default model has",
+        ("share",),
+        "",
+        (1.5,),
+    ),
+    "five_offset": Row("cuboid, each of five views off by 3.5 mm rms, worst of 10 seeds: mean", ("mean",), "mm", (2.0e-3,)),
     "tracking": Row("executed torch tip from the plan, p95", ("p95",), "mm", (0.3e-3,)),
     "speed": Row("torch speed from the one asked for, on the weld, max", ("max",), "%", (0.02,)),
     "plan_stages": Row("cloud to path, 307,200 points, stages alone, 2 cores", ("seconds",), "s", (0.4,)),

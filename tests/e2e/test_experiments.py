@@ -62,6 +62,38 @@ def test_sensitivity_is_measured_and_drawn(tmp_path):
     assert cv2.imread(str(tmp_path / "11_sensitivity.png")).std() > 5
 
 
+@pytest.mark.render
+def test_a_scene_is_held_to_its_limits_and_one_that_breaks_them_is_named(tmp_path, capsys, monkeypatch):
+    module = script("04_five_scenes")
+    words = ["04", "--scenes", "straight", "--seeds", "1", "--parts", "d415", "offset", "--jobs", "1", "--out", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", words)
+    assert module.main() == 0
+    assert "Limits broken: none." in (tmp_path / "04_five_scenes.md").read_text()
+    bare, clamped = json.loads((tmp_path / "04_five_scenes.json").read_text())["cases"]
+    assert [bare["condition"], clamped["condition"]] == ["bare", "4 clamps"]
+    assert bare["rows"][0]["mean"] < 0.4e-3
+    monkeypatch.setitem(module.MOST, "straight", {"mean": 1e-6})
+    assert module.main() == 1
+    assert "* straight, bare, seed 0: mean mm" in capsys.readouterr().out
+
+
+@pytest.mark.render
+def test_smoothing_is_measured_and_drawn(tmp_path):
+    command = [sys.executable, str(EXPERIMENTS / "13_smoothing.py"), "--quick", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    content = json.loads((tmp_path / "13_smoothing.json").read_text())
+    exact = {(row["smoother"], row["radius"]): row for row in content["rows"] if row["noise"] == "none"}
+    assert abs(exact["mls", 0.0]["root_lost"]) < 0.05e-3
+    assert exact["mls", 0.005]["root_lost"] > 0.2e-3
+    assert abs(exact["section", None]["wider"]) < 0.2e-3
+    for row in content["curves"]:
+        bias, scatter = ([each[k] for each in row["by_strength"]] for k in (1, 2))
+        assert (np.diff(bias) > -1e-8).all()  # but for rounding
+        assert (np.diff(scatter) < 1e-8).all()
+    assert cv2.imread(str(tmp_path / "13_smoothing.png")).std() > 5
+
+
 def test_the_budget_is_a_table_of_every_source():
     module = script("12_error_budget")
     names = [*module.sources(0)]

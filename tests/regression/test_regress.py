@@ -161,6 +161,20 @@ def test_an_update_rewrites_with_a_reason_and_then_nothing_is_worse(tmp_path, mo
     assert [path.name for path in tmp_path.iterdir()] == ["mine.json"]
 
 
+def test_recorded_figures_judge_the_sensor_they_were_recorded_with(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["regress", "--scenes", "straight", "--methods", "profile", "--seeds", "1", "--jobs", "1", "--sensor", "exact"]
+    assert main([*words, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["sensor"], said["golden"]) == ("exact", None)
+    (row,) = said["rows"]
+    assert not row["judged"]
+    assert row["figures"]["mean"] < 0.05e-3  # no noise
+    tight = tightened(tmp_path / "tight.json", 1e-3)
+    assert main([*words, "--golden", str(tight), "--keep", "kept"]) == 1
+    assert "WORSE straight, profile, seed 0: cross-track mean" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -183,6 +197,8 @@ def test_an_update_rewrites_with_a_reason_and_then_nothing_is_worse(tmp_path, mo
         ["--update"],
         ["--update", "--reason", " "],
         ["--reason", "why"],
+        ["--sensor", "sonar"],
+        ["--update", "--reason", "why", "--sensor", "exact"],
         ["--update", "--reason", "why", "--set", "path.speed=6 mm/s", "--golden", "x.json"],
         ["--update", "--reason", "why", "--golden", "no/folder/x.json"],
         ["--set", "scene.groove.width=10 mm"],

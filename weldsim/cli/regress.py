@@ -11,9 +11,13 @@ from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, Method, choose_plat
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
+from weldsim.sensor.choose import SensorName
 
 if TYPE_CHECKING:
     from weldsim.regression import Golden, Regression
+
+
+GOLDEN_SENSOR: SensorName = "d415"  # with which golden figures are recorded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +40,9 @@ class Regress(ConfigOptions):
 
     jobs: int = field(default_factory=lambda: min(4, os.cpu_count() or 1))
     """Processes, a core each; as many as there are cores, 4 at most, by default."""
+
+    sensor: SensorName = GOLDEN_SENSOR
+    """What looks. Recorded figures are those of the default; by any other sensor nothing is judged unless --golden is given."""
 
     execute: bool = False
     """Let the simulated arm weld what was planned too. Left out by default: it takes several times as long as everything
@@ -76,6 +83,7 @@ class Regress(ConfigOptions):
                 seeds=self.seeds,
                 jobs=self.jobs,
                 config=config,
+                sensor=self.sensor,
                 execute=self.execute,
                 golden=golden,
                 keep=None if self.update else self.keep,
@@ -99,6 +107,8 @@ class Regress(ConfigOptions):
             raise InputError("--reason: is for --update")
         if self.update and (self.config is not None or self.set):
             raise InputError("--update: golden figures are those of the default settings; leave --config and --set out")
+        if self.update and self.sensor != GOLDEN_SENSOR and self.golden is None:
+            raise InputError(f"--update: golden figures are those of {GOLDEN_SENSOR}; give --golden for {self.sensor}'s own")
         if self.update and is_packed(path):
             raise InputError(f"--update: {path} belongs to the installed package; give --golden", path=str(path))
         if any(text.startswith(SCENE_PREFIX) for text in self.set) and not self.scenes:
@@ -112,11 +122,17 @@ class Regress(ConfigOptions):
         if not self.update:
             check_folder(nearest_folder(self.keep / "run"), self.keep)
 
+    @property
+    def _judges(self) -> bool:
+        """Whether there are figures to judge this sensor by."""
+        return self.sensor == GOLDEN_SENSOR or self.golden is not None
+
     def _golden(self, path: Path) -> "Golden":
-        """What to judge by; nothing yet where the first recording is asked for."""
+        """What to judge by; nothing yet where the first recording is asked for, nor for a sensor without any."""
         from weldsim.regression import Golden, read_golden
 
-        return Golden() if self.update and not path.exists() else read_golden(path)
+        first = self.update and not path.exists()
+        return Golden() if first or not self._judges else read_golden(path)
 
     def _write(self, outcome: "Regression", golden: "Golden", path: Path) -> list[Path]:
         written = []
@@ -158,7 +174,8 @@ class Regress(ConfigOptions):
         ]
         return {
             "passed": outcome.passed,
-            "golden": str(path),
+            "sensor": self.sensor,
+            "golden": str(path) if self._judges else None,
             "units": {"length": "m", "angle": "rad", "time": "s"},
             "seconds": outcome.seconds,
             "jobs": outcome.jobs,
@@ -179,7 +196,9 @@ class Regress(ConfigOptions):
                 print(f"  WORSE {sentence(deviation)}")
             if row.folder is not None:
                 print(f"  left {row.folder}")
-        if not self.update:
+        if not self._judges:
+            print(f"  nothing is judged: {path} holds figures of {GOLDEN_SENSOR}, not of {self.sensor}")
+        elif not self.update:
             print(f"  {'nothing is' if outcome.passed else f'{len(outcome.deviations)} figures are'} worse than {path} allows")
         for place in written:
             print(f"  wrote {place}")
