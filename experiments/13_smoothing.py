@@ -135,18 +135,18 @@ def shape(points: Float[ndarray, "n 3"], seen: Scan) -> Row:
     return {
         "root_lost": level - float(left_over[at_root].mean()),
         "lips_sunk": float(left_over[at_lips].mean()) - level,
-        "wider": _width_at(centres, profile, seen.depth / 2) - half,
+        "wider": None if (width := _width_at(centres, profile, seen.depth / 2)) is None else width - half,
         "bias": float(np.nanmean(offs)),
         "p95": float(np.nanpercentile(np.abs(offs), 95)),
         "profile": [centres.tolist(), profile.tolist()],
     }
 
 
-def _width_at(x: Float[ndarray, "w"], depth: Float[ndarray, "w"], level: float) -> float:
-    """Distance between the outermost crossings of a level [m]; 0 where the profile never reaches it."""
+def _width_at(x: Float[ndarray, "w"], depth: Float[ndarray, "w"], level: float) -> float | None:
+    """Distance between the outermost crossings of a level [m]; None where the profile never reaches it."""
     deep = np.flatnonzero(depth > level)
     if len(deep) == 0:
-        return 0.0
+        return None
     i, j = int(deep[0]), int(deep[-1])
     left = np.interp(level, depth[i - 1 : i + 1], x[i - 1 : i + 1])
     right = np.interp(-level, -depth[j : j + 2], x[j : j + 2])
@@ -267,13 +267,13 @@ def measure(widths: tuple[float, ...], scenes: tuple[str, ...], radii: tuple[flo
 
 def mean_of(rows: list[Row], name: str, **where: Any) -> float:
     """Mean over the seeds [m]; NaN where there is none."""
-    mine = [row[name] for row in rows if name in row and all(row[key] == value for key, value in where.items())]
+    mine = [row[name] for row in rows if row.get(name) is not None and all(row[key] == value for key, value in where.items())]
     return float(np.mean(np.abs(mine) if name == "bias" else mine)) if mine else float("nan")
 
 
 def markdown(rows: list[Row], tracks: list[Row]) -> str:
     """Three tables in millimetres: grooves under each smoother, the published method's line, curves."""
-    lines = ["Millimetres; grooves: mean of the seeds, `bias` of its size."]
+    lines = ["Millimetres; grooves: mean of the seeds, `bias` of its size; a groove that is nowhere half as deep has no width."]
     for noise, title in NOISES.items():
         lines += [
             "",
