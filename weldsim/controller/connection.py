@@ -1,0 +1,90 @@
+"""One client's socket: never waited for, and never sent half a message."""
+
+import socket
+from typing import Any, Protocol
+
+RECEIVE_SIZE = 65536
+BACKLOG_LIMIT = 1 << 20  # [byte] a client this far behind is given up
+
+
+class Session(Protocol):
+    """What answers one client."""
+
+    def received(self, data: bytes) -> bytes:
+        """The answer to bytes that have come in, or nothing."""
+        ...
+
+    def greeting(self) -> bytes:
+        """What the client is told first, or nothing."""
+        ...
+
+    def ended(self) -> None:
+        """The client has gone."""
+        ...
+
+
+class Connection:
+    """A non-blocking socket with what could not be sent yet.
+
+    Attributes:
+        session: what answers.  open: whether the client is still there.
+    """
+
+    def __init__(self, sock: socket.socket, session: Session) -> None:
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.socket, self.session, self.open = sock, session, True
+        self._waiting = bytearray()
+        self.send(session.greeting())
+
+    @property
+    def behind(self) -> bool:
+        """Whether something could not be sent yet."""
+        return bool(self._waiting)
+
+    def send(self, data: bytes) -> None:
+        """Send now what the socket takes, the rest later; closes when the client has gone or reads nothing."""
+        if not data or not self.open:
+            return
+        self._waiting += data
+        self.flush()
+        if len(self._waiting) > BACKLOG_LIMIT:
+            self.close()
+
+    def flush(self) -> None:
+        """Send what is waiting."""
+        try:
+            while self._waiting:
+                sent = self.socket.send(self._waiting)
+                del self._waiting[:sent]
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+
+    def receive(self) -> None:
+        """Let the session answer what has come in."""
+        try:
+            data = self.socket.recv(RECEIVE_SIZE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self.send(self.session.received(data))
+        if not data or getattr(self.session, "finished", False):
+            self.close()
+
+    def close(self) -> None:
+        """End the session; the socket stays until `release`, so that who waits for it can let go first."""
+        if self.open:
+            self.open = False
+            self.session.ended()
+
+    def release(self) -> None:
+        """Hang up."""
+        self.close()
+        self.socket.close()
+
+    def fileno(self) -> Any:
+        return self.socket.fileno()

@@ -1,0 +1,200 @@
+"""Functions that move the arm. Each period of motion is one turn of a generator."""
+
+from collections.abc import Iterator
+from math import hypot
+from typing import Any
+
+from weldsim.controller.errors import MotionFault
+from weldsim.controller.functions.check import is_pose, positive, six
+from weldsim.controller.kinematics import pose_joints, tcp_pose
+from weldsim.controller.machine import Machine
+from weldsim.controller.poses import pose_between, turn_between
+from weldsim.controller.reference import STOP_DECELERATION
+from weldsim.controller.trapezoid import Trapezoid
+from weldsim.controller.urscript.errors import ScriptError
+from weldsim.controller.urscript.values import number
+from weldsim.kinematics import SPEED_LIMIT
+
+Motion = Iterator[None]
+TURN_RADIUS = 0.25  # [m] a turn of one radian of the tool counts as this long a way
+MAX_ACCELERATION = 40.0  # [rad/s2] or [m/s2]
+LOOKAHEAD, GAIN = (0.03, 0.2), (100.0, 2000.0)  # ranges of servoj
+LEAST_TIME = 1e-9  # [s]
+
+
+class MotionFunctions:
+    """movej, movel, movep, servoj, servoc, speedj, speedl, stopj, stopl.
+
+    Blends are not modelled: every move comes to rest at its target. servoj follows its target `lookahead_time` late; its gain is
+    checked and otherwise not modelled.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self._machine, self._reference = machine, machine.reference
+
+    def movej(self, q: Any, a: float = 1.4, v: float = 1.05, t: float = 0, r: float = 0) -> Motion:
+        """Joints to q, or to the joints of a pose, all arriving together; a [rad/s2], v [rad/s], t [s] instead of v."""
+        target = self._joints(q)
+        a, v = min(positive(a, "a"), MAX_ACCELERATION), min(positive(v, "v"), SPEED_LIMIT)
+        while True:
+            yield from self._settle()
+            start = self._reference.q
+            way = [new - old for new, old in zip(target, start, strict=True)]
+            length = max(abs(x) for x in way)
+            profile = self._profile(length, v, a, t)
+
+            def at(elapsed: float, start: list = start, way: list = way, length: float = length, p: Trapezoid = profile) -> None:
+                s, speed = p.at(elapsed)
+                share, rate = (s / length, speed / length) if length > 0 else (1.0, 0.0)
+                rate *= self._machine.io.slider
+                self._reference.move([q0 + share * x for q0, x in zip(start, way, strict=True)], [rate * x for x in way])
+
+            if (yield from self._along(at, profile.duration)):
+                return
+
+    def movel(self, pose: Any, a: float = 1.2, v: float = 0.25, t: float = 0, r: float = 0) -> Motion:
+        """TCP to a pose, or to that of joint angles, on a straight line; a [m/s2], v [m/s], t [s] instead of v."""
+        target = self._pose(pose)
+        a, v = min(positive(a, "a"), MAX_ACCELERATION), positive(v, "v")
+        self._joints_of(target)
+        while True:
+            yield from self._settle()
+            start = tcp_pose(self._reference.q, self._tcp)
+            way = hypot(*(new - old for new, old in zip(target[:3], start[:3], strict=True)))
+            length = max(way, TURN_RADIUS * turn_between(start, target))
+            profile = self._profile(length, v, a, t)
+
+            def at(elapsed: float, start: list = start, length: float = length, p: Trapezoid = profile) -> None:
+                s, speed = p.at(elapsed)
+                q = self._near(pose_between(start, target, s / length if length > 0 else 1.0))
+                self._reference.move(q, None if speed > 0 else [0.0] * 6)
+
+            if (yield from self._along(at, profile.duration)):
+                return
+
+    def movep(self, pose: Any, a: float = 1.2, v: float = 0.25, r: float = 0) -> Motion:
+        """As movel."""
+        yield from self.movel(pose, a, v)
+
+    def servoj(
+        self, q: Any, a: float = 0, v: float = 0, t: float = 0.008, lookahead_time: float = 0.1, gain: float = 300
+    ) -> Motion:
+        """Follow q [rad] for t [s], `lookahead_time` late; a and v are not used, as on a real controller."""
+        target = six(q, "servoj q")
+        for name, value, (low, high) in (("lookahead_time", lookahead_time, LOOKAHEAD), ("gain", gain, GAIN)):
+            if not low <= number(value) <= high:
+                raise ScriptError(f"servoj: {name} = {value} is outside {low} to {high}")
+        yield from self._for(t, lambda: self._reference.servo(target, lookahead_time))
+
+    def servoc(self, pose: Any, a: float = 1.2, v: float = 0.25, r: float = 0) -> Motion:
+        """As movel."""
+        yield from self.movel(pose, a, v)
+
+    def speedj(self, qd: Any, a: float = 1.4, t: float = 0) -> Motion:
+        """Joint speeds to qd [rad/s] at a [rad/s2]; returns after t [s], or when they are reached."""
+        target, a = six(qd, "speedj qd"), min(positive(a, "a"), MAX_ACCELERATION)
+        if number(t) > 0:
+            yield from self._for(t, lambda: self._reference.ramp(target, a))
+        else:
+            yield from self._until(lambda: self._reference.ramp(target, a))
+
+    def speedl(self, xd: Any, a: float = 1.2, t: float = 0, aRot: float = 0) -> Motion:
+        """TCP velocity to xd [m/s, rad/s] at a [m/s2]; returns after t [s], or when it is reached."""
+        target, a = six(xd, "speedl xd"), min(positive(a, "a"), MAX_ACCELERATION)
+        if number(t) > 0:
+            yield from self._for(t, lambda: self._ramp_tool(target, a))
+        else:
+            yield from self._until(lambda: self._ramp_tool(target, a))
+
+    def stopj(self, a: float = 2.0) -> Motion:
+        """Rest, the leading joint slowing down at a [rad/s2]."""
+        a = min(positive(a, "a"), MAX_ACCELERATION)
+        yield from self._until(lambda: self._reference.ramp([0.0] * 6, a))
+
+    def stopl(self, a: float = 20.0, aRot: float = 0) -> Motion:
+        """Rest, the TCP slowing down at a [m/s2] on its line."""
+        a = min(positive(a, "a"), MAX_ACCELERATION)
+        yield from self._until(lambda: self._ramp_tool([0.0] * 6, a))
+
+    def _ramp_tool(self, target: list[float], a: float) -> bool:
+        """One period towards a TCP velocity; whether it is reached."""
+        reference = self._reference
+        now = reference.twist(self._tcp)
+        change = [new - old for new, old in zip(target, now, strict=True)]
+        leading = max(hypot(*change[:3]), TURN_RADIUS * hypot(*change[3:]))
+        step = a * reference.period
+        if leading <= step:
+            if any(target):
+                reference.drive(target, self._tcp)
+            else:
+                reference.ramp(target, MAX_ACCELERATION)
+            return True
+        reference.drive([old + x * step / leading for old, x in zip(now, change, strict=True)], self._tcp)
+        return False
+
+    @property
+    def _tcp(self) -> Any:
+        return self._machine.tool.tcp_matrix
+
+    def _joints(self, target: Any) -> list[float]:
+        return self._joints_of(six(target, "target")) if is_pose(target) else six(target, "target")
+
+    def _pose(self, target: Any) -> list[float]:
+        pose = six(target, "target")
+        return pose if is_pose(target) else tcp_pose(pose, self._tcp)
+
+    def _joints_of(self, pose: list[float]) -> list[float]:
+        q = pose_joints(pose, self._tcp, self._reference.q)
+        if q is None:
+            raise ScriptError(f"the arm cannot reach p[{', '.join(f'{x:.4f}' for x in pose)}]")
+        return q
+
+    def _near(self, pose: list[float]) -> list[float]:
+        q = pose_joints(pose, self._tcp, self._reference.q)
+        if q is None:
+            raise MotionFault(f"the arm cannot reach p[{', '.join(f'{x:.4f}' for x in pose)}] on its line")
+        return q
+
+    def _profile(self, length: float, v: float, a: float, t: float) -> Trapezoid:
+        return Trapezoid.lasting(length, t, a) if number(t) > 0 and length > 0 else Trapezoid(length, v, a)
+
+    def _command(self, step: Any) -> bool:
+        """What `step` returns after it has commanded this period; a fault stops the arm and counts as not done."""
+        if self._reference.commanded:
+            raise ScriptError("another thread is already moving the arm")
+        try:
+            return bool(step())
+        except MotionFault as fault:
+            self._machine.protective_stop(str(fault))
+            return False
+
+    def _for(self, t: float, step: Any) -> Motion:
+        """`step` every period for t [s], one period at least."""
+        for _ in range(max(1, round(number(t) / self._reference.period))):
+            self._command(step)
+            yield
+
+    def _until(self, step: Any) -> Motion:
+        """`step` every period until it says that it is done."""
+        done = False
+        while not done:
+            done = self._command(step)
+            yield
+
+    def _settle(self) -> Motion:
+        """Rest, before a move that begins from rest."""
+        while not self._reference.resting:
+            self._command(lambda: self._reference.ramp([0.0] * 6, STOP_DECELERATION))
+            yield
+
+    def _along(self, at: Any, duration: float) -> Iterator[None]:
+        """`at(elapsed)` every period up to `duration`; whether it got there, or was held and must be planned anew."""
+        elapsed, before = 0.0, self._reference.q
+        while elapsed < duration - LEAST_TIME:
+            if self._reference.q is not before:
+                return False  # something else moved the reference: a pause, a protective stop
+            elapsed = min(duration, elapsed + self._reference.period * self._machine.io.slider)
+            self._command(lambda: at(elapsed))  # noqa: B023 - called at once
+            before = self._reference.q
+            yield
+        return True

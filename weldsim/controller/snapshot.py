@@ -1,0 +1,64 @@
+"""What the controller reports after one control period: the source of every RTDE output."""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from weldsim.controller.kinematics import jacobian, tcp_pose
+from weldsim.controller.modes import RobotMode, RuntimeState, safety_bits
+from weldsim.kinematics import link_frames
+
+if TYPE_CHECKING:
+    from weldsim.controller.machine import Machine
+
+TORQUE_CONSTANT = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)  # [Nm/A] order of magnitude, behind the gear; no published figure
+
+
+class Snapshot:
+    """State at one time; what has to be computed is computed when first asked for.
+
+    Attributes:
+        t: time since power-on [s].  busy: time the last period took to compute [s].
+        q, qd: measured [rad, rad/s].  q_target, qd_target, qdd_target: the reference.  torque [Nm].
+        io: registers and signals.  tcp_offset: active TCP.  payload [kg], payload_cog [m], payload_inertia [kg m2].
+        robot_mode, safety_mode, runtime_state, status_bits, safety_bits: as the RTDE guide numbers them.
+        speed_scaling: share of the programmed speed.
+    """
+
+    def __init__(self, machine: "Machine") -> None:
+        arm, reference, tool = machine.arm, machine.reference, machine.tool
+        self.t, self.busy, self.io = machine.t, machine.busy, machine.io
+        self.q, self.qd, self.torque = arm.q, arm.qd, arm.torque
+        self.q_target, self.qd_target, self.qdd_target = reference.q, reference.qd, reference.qdd
+        self._tcp = tool.tcp_matrix
+        self.tcp_offset, self.payload = tool.tcp, tool.payload
+        self.payload_cog, self.payload_inertia = tool.cog, tool.inertia
+        self.robot_mode, self.safety_mode = int(machine.robot_mode), int(machine.safety_mode)
+        self.runtime_state, self.safety_bits = int(machine.runtime), safety_bits(machine.safety_mode)
+        playing = machine.runtime is RuntimeState.PLAYING
+        powered = machine.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
+        self.status_bits = int(powered) | int(playing) << 1 | 1 << 3
+        self.speed_scaling = machine.io.slider if machine.can_move else 0.0
+
+    @cached_property
+    def current(self) -> list[float]:
+        return [torque / constant for torque, constant in zip(self.torque, TORQUE_CONSTANT, strict=True)]
+
+    @cached_property
+    def tcp_pose(self) -> list[float]:
+        return tcp_pose(self.q, self._tcp)
+
+    @cached_property
+    def tcp_pose_target(self) -> list[float]:
+        return tcp_pose(self.q_target, self._tcp)
+
+    @cached_property
+    def tcp_speed(self) -> list[float]:
+        return (jacobian(self.q, self._tcp) @ self.qd).tolist() if any(self.qd) else [0.0] * 6
+
+    @cached_property
+    def tcp_speed_target(self) -> list[float]:
+        return (jacobian(self.q_target, self._tcp) @ self.qd_target).tolist() if any(self.qd_target) else [0.0] * 6
+
+    @cached_property
+    def elbow(self) -> list[float]:
+        return link_frames(self.q)[2, :3, 3].tolist()
