@@ -8,6 +8,7 @@ from itertools import groupby
 
 import tyro
 
+from weldsim.cli.controller import Controller
 from weldsim.cli.doctor import Doctor
 from weldsim.cli.dry_run import DryRunCommand
 from weldsim.cli.plan import Plan
@@ -24,6 +25,7 @@ COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
     "dry-run": DryRunCommand,
     "scenes": Scenes,
     "regress": Regress,
+    "controller": Controller,
     "doctor": Doctor,
 }
 DESCRIPTION = "Simulation-first digital twin of a vision-guided arc-welding cell. `weldsim --version` prints the version."

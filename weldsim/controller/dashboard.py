@@ -9,8 +9,24 @@ BANNER = b"Connected: Universal Robots Dashboard Server\n"
 MAX_LINE = 65536
 LOCAL = "Command is not allowed due to safety reasons."  # what an e-Series in local control says
 _LOCAL_TOO = frozenset(
-    "robotmode|running|programState|safetymode|safetystatus|PolyscopeVersion|version|get loaded program|isProgramSaved|quit"
-    "|is in remote control|get serial number|get robot model|getUserRole|get operational mode|help".split("|")
+    [
+        "robotmode",
+        "running",
+        "programState",
+        "safetymode",
+        "safetystatus",
+        "PolyscopeVersion",
+        "version",
+        "get loaded program",
+        "isProgramSaved",
+        "quit",
+        "is in remote control",
+        "get serial number",
+        "get robot model",
+        "getUserRole",
+        "get operational mode",
+        "help",
+    ]
 )
 """What may be asked in local control."""
 

@@ -3,5 +3,5 @@
 from weldsim.errors import ExecutionError
 
 
-class MotionFault(ExecutionError):
+class MotionFault(ExecutionError):  # noqa: N818 - it is what a controller calls it
     """A motion that a controller answers with a protective stop. `data`: none."""

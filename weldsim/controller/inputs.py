@@ -25,7 +25,11 @@ _FIXED = {
     "external_force_torque": "VECTOR6D",
 }
 _NUMBERED = re.compile(r"input_(bit|int|double)_register_(\d+)")
-_BANKS: dict[str, tuple[str, int, int]] = {"bit": ("BOOL", 64, BITS), "int": ("INT32", 0, INTEGERS), "double": ("DOUBLE", 0, DOUBLES)}
+_BANKS: dict[str, tuple[str, int, int]] = {
+    "bit": ("BOOL", 64, BITS),
+    "int": ("INT32", 0, INTEGERS),
+    "double": ("DOUBLE", 0, DOUBLES),
+}
 _SHIFT = {"standard_digital_output": 0, "configurable_digital_output": 8, "tool_digital_output": 16}
 
 

@@ -15,7 +15,7 @@ from weldsim.controller.reference import Reference
 from weldsim.controller.registers import Registers
 from weldsim.controller.snapshot import Snapshot
 from weldsim.controller.tool import Tool
-from weldsim.controller.urscript.compiler import compile_program
+from weldsim.controller.urscript.compiler import Compiled, compile_program
 from weldsim.controller.urscript.errors import ScriptError
 from weldsim.controller.urscript.program import Program
 from weldsim.controller.watchdog import Watchdogs
@@ -49,6 +49,7 @@ class Machine:
         self.history: deque[list[float]] = deque([arm.q], maxlen=100)
         self._builtins: Mapping[str, Callable] = {}
         self._program: Program | None = None
+        self._compiled: dict[str, Compiled] = {}
         self._beside: list[Program] = []
         self._stopped_at = 0.0
         self._snapshot: Snapshot | None = None
@@ -129,7 +130,8 @@ class Machine:
             self.say("script refused: the robot is in local control")
             return False
         try:
-            compiled = compile_program(text, self._builtins)
+            compiled = self._compiled.get(text) or compile_program(text, self._builtins)
+            self._compiled = {text: compiled}  # a client uploads its script again and again
             program = Program(compiled, self._builtins)
         except ScriptError as error:
             self.say(f"script refused: {error}")

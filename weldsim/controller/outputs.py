@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from weldsim.controller.packet import layout, width
 from weldsim.controller.profile import Profile
-from weldsim.controller.registers import BITS, DOUBLES, INTEGERS, Registers
+from weldsim.controller.registers import BITS, DOUBLES, INTEGERS
 
 if TYPE_CHECKING:
     from weldsim.controller.snapshot import Snapshot
@@ -84,7 +84,11 @@ _FIXED: dict[str, tuple[str, Getter]] = {
 }
 _E_ONLY = {"ft_raw_wrench", "actual_current_window", "joint_position_deviation_ratio", "collision_detection_ratio", "safety_status"}
 _NUMBERED = re.compile(r"(input|output)_(bit|int|double)_register_(\d+)")
-_BANKS: dict[str, tuple[str, int, int]] = {"bit": ("BOOL", 64, BITS), "int": ("INT32", 0, INTEGERS), "double": ("DOUBLE", 0, DOUBLES)}
+_BANKS: dict[str, tuple[str, int, int]] = {
+    "bit": ("BOOL", 64, BITS),
+    "int": ("INT32", 0, INTEGERS),
+    "double": ("DOUBLE", 0, DOUBLES),
+}
 
 
 def _mask(bits: Sequence[bool], first: int) -> int:

@@ -41,9 +41,10 @@ def pose_of(matrix: Matrix) -> list[float]:
     if sine > 1e-6 or cosine > 0:
         scale = angle / sine if sine > 1e-12 else 0.5
         return [x, y, z, vector[0] * scale, vector[1] * scale, vector[2] * scale]
-    # Near half a turn the sine says nothing: the axis is in the greatest column of R + I.
-    columns = ((a + 1.0, d + b, g + c), (b + d, e + 1.0, h + f), (c + g, f + h, i + 1.0))
-    axis = max(((column[k], column) for k, column in enumerate(columns)), key=lambda pair: pair[0])[1]
+    # Near half a turn the sine says nothing: the axis is in the greatest column of (R + R^T) / 2 - cos(angle) I.
+    k = cosine / 2.0
+    columns = ((a - k, (d + b) / 2, (g + c) / 2), ((b + d) / 2, e - k, (h + f) / 2), ((c + g) / 2, (f + h) / 2, i - k))
+    axis = max(((column[n], column) for n, column in enumerate(columns)), key=lambda pair: pair[0])[1]
     scale = angle / hypot(*axis)
     if axis[0] * vector[0] + axis[1] * vector[1] + axis[2] * vector[2] < 0:
         scale = -scale

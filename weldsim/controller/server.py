@@ -5,6 +5,7 @@ comes and counts from the next period on.
 """
 
 import gc
+import os
 import selectors
 import socket
 import time
@@ -15,11 +16,11 @@ from weldsim.controller.dashboard import Dashboard, DashboardSession
 from weldsim.controller.faults import FaultSession
 from weldsim.controller.functions import builtins
 from weldsim.controller.machine import Machine
+from weldsim.controller.ports import DASHBOARD, FAULTS, PRIMARY, REALTIME, RTDE, SECONDARY
 from weldsim.controller.rtde import Claims, RtdeSession
 from weldsim.controller.script_port import ScriptSession
 from weldsim.errors import InputError
 
-DASHBOARD, PRIMARY, SECONDARY, REALTIME, RTDE, CONTROL = 29999, 30001, 30002, 30003, 30004, 30099
 CATCH_UP = 0.1  # [s] of lateness made good by periods without a pause; what is more is lost time
 
 
@@ -42,7 +43,7 @@ class Server:
             SECONDARY: lambda: ScriptSession(machine),
             REALTIME: lambda: ScriptSession(machine),
             RTDE: lambda: RtdeSession(machine, claims),
-            CONTROL: lambda: FaultSession(self),
+            FAULTS: lambda: FaultSession(self),
         }
         # select() waits to the microsecond where epoll() waits to the millisecond.
         self._selector = selectors.SelectSelector()
@@ -50,18 +51,20 @@ class Server:
         self._stalled_until = 0.0
         self.overruns, self.lost = 0, 0.0
         self._stopping = False
-        try:
-            for port, session in sessions.items():
-                self._listen(port, session)
-        except OSError as error:
-            self.close()
-            reason = error.strerror or error
-            raise InputError(
-                f"controller: {host} port {port}: {reason}; another 127.0.0.x holds a second controller", host=host, port=port
-            ) from None
+        for port, session in sessions.items():
+            self._listen(port, session)
 
     def _listen(self, port: int, session: Callable[[], Session]) -> None:
-        listener = socket.create_server((self.host, port))
+        try:
+            listener = socket.create_server((self.host, port))
+        except OSError as error:
+            self.close()
+            reason = os.strerror(error.errno) if error.errno else error
+            raise InputError(
+                f"controller: {self.host} port {port}: {reason}; another address, 127.0.0.2 say, holds a second controller",
+                host=self.host,
+                port=port,
+            ) from None
         listener.setblocking(False)
         self._selector.register(listener, selectors.EVENT_READ, session)
 
@@ -85,6 +88,7 @@ class Server:
                     self.overruns += 1
                 if late > CATCH_UP:
                     self.lost += late
+                    self.machine.say(f"{late:.3f} s lost: this machine did not keep up")
                     deadline = time.perf_counter() + interval
                 if until():
                     return

@@ -3,6 +3,8 @@
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from weldsim.controller.kinematics import jacobian, tcp_pose
 from weldsim.controller.modes import RobotMode, RuntimeState, safety_bits
 from weldsim.kinematics import link_frames
@@ -61,4 +63,4 @@ class Snapshot:
 
     @cached_property
     def elbow(self) -> list[float]:
-        return link_frames(self.q)[2, :3, 3].tolist()
+        return link_frames(np.array(self.q))[2, :3, 3].tolist()

@@ -11,9 +11,19 @@ from weldsim.controller.functions.system import SystemFunctions
 from weldsim.controller.machine import Machine
 
 E_ONLY = frozenset(
-    "get_steptime tool_contact get_actual_joint_positions_history get_target_payload get_target_payload_cog"
-    " get_target_payload_inertia set_target_payload force_mode_set_gain_scaling get_target_waypoint get_freedrive_status"
-    " ft_rtde_input_enable".split()
+    [
+        "get_steptime",
+        "tool_contact",
+        "get_actual_joint_positions_history",
+        "get_target_payload",
+        "get_target_payload_cog",
+        "get_target_payload_inertia",
+        "set_target_payload",
+        "force_mode_set_gain_scaling",
+        "get_target_waypoint",
+        "get_freedrive_status",
+        "ft_rtde_input_enable",
+    ]
 )
 """Functions that a CB3 controller does not have."""
 

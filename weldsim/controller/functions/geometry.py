@@ -127,4 +127,3 @@ def _three(value: Any) -> Sequence[float]:
     if not isinstance(value, list) or len(value) != 3:
         raise ScriptError("expected three numbers")
     return [float(number(x)) for x in value]
-

@@ -1,6 +1,6 @@
 """Functions that move the arm. Each period of motion is one turn of a generator."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Generator
 from math import hypot
 from typing import Any
 
@@ -8,18 +8,20 @@ from weldsim.controller.errors import MotionFault
 from weldsim.controller.functions.check import is_pose, positive, six
 from weldsim.controller.kinematics import pose_joints, tcp_pose
 from weldsim.controller.machine import Machine
-from weldsim.controller.poses import pose_between, turn_between
+from weldsim.controller.poses import Matrix, pose_between, turn_between
 from weldsim.controller.reference import STOP_DECELERATION
 from weldsim.controller.trapezoid import Trapezoid
 from weldsim.controller.urscript.errors import ScriptError
 from weldsim.controller.urscript.values import number
 from weldsim.kinematics import SPEED_LIMIT
 
-Motion = Iterator[None]
+Motion = Generator[None, None, None]
+Step = Callable[[], object]
 TURN_RADIUS = 0.25  # [m] a turn of one radian of the tool counts as this long a way
 MAX_ACCELERATION = 40.0  # [rad/s2] or [m/s2]
 LOOKAHEAD, GAIN = (0.03, 0.2), (100.0, 2000.0)  # ranges of servoj
 LEAST_TIME = 1e-9  # [s]
+ARRIVED, ARRIVAL_TIME = 5e-5, 0.1  # [rad] a move ends when every joint is this near to its target, or this much [s] later
 
 
 class MotionFunctions:
@@ -43,7 +45,9 @@ class MotionFunctions:
             length = max(abs(x) for x in way)
             profile = self._profile(length, v, a, t)
 
-            def at(elapsed: float, start: list = start, way: list = way, length: float = length, p: Trapezoid = profile) -> None:
+            def at(
+                elapsed: float, start: list[float] = start, way: list[float] = way, length: float = length, p: Trapezoid = profile
+            ) -> None:
                 s, speed = p.at(elapsed)
                 share, rate = (s / length, speed / length) if length > 0 else (1.0, 0.0)
                 rate *= self._machine.io.slider
@@ -64,7 +68,7 @@ class MotionFunctions:
             length = max(way, TURN_RADIUS * turn_between(start, target))
             profile = self._profile(length, v, a, t)
 
-            def at(elapsed: float, start: list = start, length: float = length, p: Trapezoid = profile) -> None:
+            def at(elapsed: float, start: list[float] = start, length: float = length, p: Trapezoid = profile) -> None:
                 s, speed = p.at(elapsed)
                 q = self._near(pose_between(start, target, s / length if length > 0 else 1.0))
                 self._reference.move(q, None if speed > 0 else [0.0] * 6)
@@ -133,7 +137,7 @@ class MotionFunctions:
         return False
 
     @property
-    def _tcp(self) -> Any:
+    def _tcp(self) -> Matrix:
         return self._machine.tool.tcp_matrix
 
     def _joints(self, target: Any) -> list[float]:
@@ -158,7 +162,7 @@ class MotionFunctions:
     def _profile(self, length: float, v: float, a: float, t: float) -> Trapezoid:
         return Trapezoid.lasting(length, t, a) if number(t) > 0 and length > 0 else Trapezoid(length, v, a)
 
-    def _command(self, step: Any) -> bool:
+    def _command(self, step: Step) -> bool:
         """What `step` returns after it has commanded this period; a fault stops the arm and counts as not done."""
         if self._reference.commanded:
             raise ScriptError("another thread is already moving the arm")
@@ -168,13 +172,13 @@ class MotionFunctions:
             self._machine.protective_stop(str(fault))
             return False
 
-    def _for(self, t: float, step: Any) -> Motion:
+    def _for(self, t: float, step: Step) -> Motion:
         """`step` every period for t [s], one period at least."""
         for _ in range(max(1, round(number(t) / self._reference.period))):
             self._command(step)
             yield
 
-    def _until(self, step: Any) -> Motion:
+    def _until(self, step: Step) -> Motion:
         """`step` every period until it says that it is done."""
         done = False
         while not done:
@@ -187,7 +191,7 @@ class MotionFunctions:
             self._command(lambda: self._reference.ramp([0.0] * 6, STOP_DECELERATION))
             yield
 
-    def _along(self, at: Any, duration: float) -> Iterator[None]:
+    def _along(self, at: Callable[[float], None], duration: float) -> Generator[None, None, bool]:
         """`at(elapsed)` every period up to `duration`; whether it got there, or was held and must be planned anew."""
         elapsed, before = 0.0, self._reference.q
         while elapsed < duration - LEAST_TIME:
@@ -196,5 +200,9 @@ class MotionFunctions:
             elapsed = min(duration, elapsed + self._reference.period * self._machine.io.slider)
             self._command(lambda: at(elapsed))  # noqa: B023 - called at once
             before = self._reference.q
+            yield
+        for _ in range(round(ARRIVAL_TIME / self._reference.period)):
+            if max(abs(q - goal) for q, goal in zip(self._machine.arm.q, self._reference.q, strict=True)) < ARRIVED:
+                break
             yield
         return True

@@ -126,7 +126,9 @@ class RobotFunctions:
     def zero_ftsensor(self) -> None:
         """Nothing: there is no sensor."""
 
-    def ft_rtde_input_enable(self, enable: bool, sensor_mass: float = 0, sensor_measuring_offset: Any = None, sensor_cog: Any = None) -> None:
+    def ft_rtde_input_enable(
+        self, enable: bool, sensor_mass: float = 0, sensor_measuring_offset: Any = None, sensor_cog: Any = None
+    ) -> None:
         """Nothing: there is no sensor."""
 
     def enable_external_ft_sensor(

@@ -32,7 +32,9 @@ class SystemFunctions:
         """A line in the log."""
         self._machine.say(f"{to_text(s1)}{to_text(s2)}")
 
-    def popup(self, s: Any, title: str = "Popup", warning: bool = False, error: bool = False, blocking: bool = False) -> Iterator[None]:
+    def popup(
+        self, s: Any, title: str = "Popup", warning: bool = False, error: bool = False, blocking: bool = False
+    ) -> Iterator[None]:
         """A message on the pendant; with blocking it waits for `close popup` on the dashboard."""
         self._machine.popup = to_text(s)
         self._machine.say(f"{title}: {to_text(s)}")

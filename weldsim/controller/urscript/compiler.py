@@ -6,7 +6,7 @@ text is executed.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from inspect import isgeneratorfunction, signature
+from inspect import isgeneratorfunction, signature, unwrap
 from types import CodeType
 
 from weldsim.controller.urscript import tree
@@ -52,7 +52,10 @@ def compile_program(text: str, builtins: Mapping[str, Callable]) -> Compiled:
         name, kind, body = program.name, program.kind, program.body
     else:
         name, kind, body = "unnamed", "def", tuple(wanted)
-    return _Compiler(body, builtins).compile(name, kind)
+    try:
+        return _Compiler(body, builtins).compile(name, kind)
+    except RecursionError:
+        raise ScriptError("nested too deeply") from None
 
 
 def _is_run_program(statement: tree.Statement) -> bool:
@@ -63,7 +66,7 @@ def _is_run_program(statement: tree.Statement) -> bool:
 class _Compiler:
     def __init__(self, body: tuple[tree.Statement, ...], builtins: Mapping[str, Callable]) -> None:
         self._builtins, self._body = builtins, body
-        slow = frozenset(name for name, function in builtins.items() if isgeneratorfunction(function))
+        slow = frozenset(name for name, function in builtins.items() if isgeneratorfunction(unwrap(function)))
         self._slow_builtins = slow
         self._scopes: Scopes = find_scopes(body, slow)
         self._locals: frozenset[str] = frozenset()
@@ -81,10 +84,10 @@ class _Compiler:
         self._block(self._body, 1)
         try:
             code = compile("\n".join(self._out) + "\n", FILE, "exec")
-        except (SyntaxError, RecursionError, MemoryError) as error:
-            reason = error.msg if isinstance(error, SyntaxError) else "nested too deeply"
-            line = self._lines[error.lineno] if isinstance(error, SyntaxError) and error.lineno else None
-            raise ScriptError(reason, line) from None
+        except SyntaxError as error:  # break outside a loop, say: what the parser does not look at
+            raise ScriptError(error.msg, self._lines[error.lineno] if error.lineno else None) from None
+        except MemoryError:  # what Python's own parser says of deep nesting
+            raise ScriptError("nested too deeply") from None
         return Compiled(name, kind, code, tuple(self._lines))
 
     def _emit(self, depth: int, text: str) -> None:

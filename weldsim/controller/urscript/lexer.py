@@ -9,8 +9,34 @@ from weldsim.controller.urscript.errors import ScriptError
 Kind = Literal["name", "keyword", "number", "string", "symbol", "end of text"]
 
 KEYWORDS = frozenset(
-    "def thread sec end if elif else while return break continue global local run kill join halt pass"
-    " enter_critical exit_critical and or not xor True False".split()
+    [
+        "def",
+        "thread",
+        "sec",
+        "end",
+        "if",
+        "elif",
+        "else",
+        "while",
+        "return",
+        "break",
+        "continue",
+        "global",
+        "local",
+        "run",
+        "kill",
+        "join",
+        "halt",
+        "pass",
+        "enter_critical",
+        "exit_critical",
+        "and",
+        "or",
+        "not",
+        "xor",
+        "True",
+        "False",
+    ]
 )
 
 _TOKEN = re.compile(

@@ -14,12 +14,20 @@ _MAX_DEPTH = 60
 def parse(text: str) -> tuple[tree.Statement, ...]:
     """The statements of a text, functions among them. Raises ScriptError, which names the line."""
     parser = _Parser(tokens(text))
-    return parser.block(until=())
+    try:
+        return parser.block(until=())
+    except RecursionError:
+        raise ScriptError("nested too deeply", parser.line) from None
 
 
 class _Parser:
     def __init__(self, found: list[Token]) -> None:
         self._tokens, self._at, self._depth = found, 0, 0
+
+    @property
+    def line(self) -> int:
+        """Of the token that comes next."""
+        return self._next.line
 
     @property
     def _next(self) -> Token:

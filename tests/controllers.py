@@ -1,0 +1,74 @@
+"""Virtual controllers for tests: one without a network, and one in its own process."""
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from tests.arm_worlds import bare_model
+from weldsim.controller.arm import Arm
+from weldsim.controller.config import ControllerConfig
+from weldsim.controller.functions import builtins
+from weldsim.controller.machine import Machine
+from weldsim.controller.ports import FAULTS
+from weldsim.controller.profile import PROFILES, Series
+from weldsim.scene.world import HOME
+
+
+def new_machine(series: Series = "cb3", config: ControllerConfig | None = None) -> Machine:
+    """A controller over the bare arm, its arm at HOME."""
+    profile = PROFILES[series]
+    machine = Machine(profile, Arm(bare_model(), HOME.tolist(), profile), config)
+    machine.provide(builtins(machine))
+    return machine
+
+
+def run_program(machine: Machine, text: str, seconds: float = 10.0) -> float:
+    """Time [s] that a program took, to its end or to `seconds`; says why where it was refused."""
+    began = machine.t
+    assert machine.upload(text), machine.log[-1]
+    while machine.program_name and machine.t - began < seconds:
+        machine.tick()
+    return machine.t - began
+
+
+def free_address() -> str:
+    """A loopback address whose controller ports nobody uses."""
+    for k in range(200):
+        host = f"127.{20 + os.getpid() % 200}.{k}.7"
+        with socket.socket() as probe:
+            try:
+                probe.bind((host, FAULTS))
+            except OSError:
+                continue
+            return host
+    raise AssertionError("no free loopback address")
+
+
+@contextmanager
+def served(*options: str) -> Iterator[str]:
+    """The address of a controller that runs in its own process until the block ends."""
+    host = free_address()
+    command = [sys.executable, "-m", "weldsim", "controller", "--host", host, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert host in line, process.stderr.read() if process.stderr else ""
+        try:
+            yield host
+        finally:
+            process.terminate()
+            process.wait(10)
+
+
+def wait_for(condition: object, seconds: float = 5.0, step: float = 0.02) -> bool:
+    """Whether `condition()` came true within `seconds`."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():  # type: ignore[operator]
+            return True
+        time.sleep(step)
+    return False

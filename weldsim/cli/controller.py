@@ -1,0 +1,92 @@
+"""`weldsim controller`."""
+
+import signal
+import sys
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import tyro
+
+from weldsim.cli.options import ConfigOptions
+from weldsim.cli.show import print_json
+from weldsim.controller.fault_names import FaultName
+from weldsim.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller(ConfigOptions):
+    """Serve a virtual UR5 controller: dashboard 29999, scripts 30001 to 30003, RTDE 30004. Ends with Ctrl-C.
+
+    `weldsim controller fault protective-stop` orders a fault from the one that is running, `weldsim controller status` asks for
+    its state.
+    """
+
+    action: tyro.conf.Positional[Literal["serve", "fault", "status"]] = "serve"
+    """Serve, order a fault, or ask for the state."""
+
+    fault: tyro.conf.Positional[Literal[FaultName, "none"]] = "none"
+    """With fault: which. recover lifts every stop and releases the brakes."""
+
+    profile: Literal["cb3", "e"] = "cb3"
+    """CB3 3.15 at 125 Hz or e-Series 5.11 at 500 Hz."""
+
+    scene: Annotated[str, tyro.conf.arg(metavar="SCENE")] = ""
+    """What stands on the table, a name or a TOML file; nothing by default. A collision is a protective stop."""
+
+    speed: float = 1.0
+    """Simulated seconds in a second."""
+
+    host: str = "127.0.0.1"
+    """Address to serve or to ask. The protocols know no password: an address that others can reach lets them move the arm."""
+
+    seconds: float = 1.0
+    """With fault stall: how long."""
+
+    low_when_stopped: tuple[int, ...] = (0,)
+    """Digital outputs that are dropped when no program runs any longer, the arc's say."""
+
+    unlock_delay: float = 5.0
+    """Seconds after a protective stop before the dashboard can unlock it, as on a real controller."""
+
+    verbose: bool = False
+    """Print the controller's log to stderr."""
+
+    def __call__(self) -> int:
+        """0."""
+        if (self.action == "fault") != (self.fault != "none"):
+            raise InputError("controller: fault takes the name of a fault, and nothing else does; see weldsim controller --help")
+        return self._serve() if self.action == "serve" else self._ask()
+
+    def _serve(self) -> int:
+        from weldsim.controller.config import ControllerConfig
+        from weldsim.controller.start import new_server
+
+        config = ControllerConfig(speed=self.speed, low_when_stopped=self.low_when_stopped, unlock_delay=self.unlock_delay)
+        server = new_server(self.profile, self.scene_of(self.scene) if self.scene else None, config, self.host)
+        if self.verbose:
+            machine = server.machine
+            machine.on_message = lambda text: print(f"{machine.t:9.3f}  {text}", file=sys.stderr, flush=True)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: server.stop())
+        if self.json:
+            print_json({"profile": self.profile, "host": self.host, "scene": self.scene or None})
+        else:
+            print(
+                f"virtual UR5 controller, profile {self.profile}, on {self.host}: dashboard 29999, script 30001-30003, RTDE 30004"
+            )
+        sys.stdout.flush()
+        server.run()
+        return 0
+
+    def _ask(self) -> int:
+        from weldsim.controller.ask import ask
+
+        reply = ask(self.host, {"status": True} if self.action == "status" else {"fault": self.fault, "seconds": self.seconds})
+        if self.json:
+            print_json(reply)
+        elif self.action == "fault":
+            print(reply["done"])
+        else:
+            for key, value in reply.items():
+                print(f"{key:14}  {value}")
+        return 0

@@ -1,0 +1,4 @@
+"""The ports of a UR controller, and the one that orders faults."""
+
+DASHBOARD, PRIMARY, SECONDARY, REALTIME, RTDE = 29999, 30001, 30002, 30003, 30004
+FAULTS = 30099  # ours alone; no real controller listens there
