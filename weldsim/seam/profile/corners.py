@@ -13,11 +13,12 @@ from weldsim.seam.profile.branches import WIDTHS
 from weldsim.seam.profile.course import Course, end_to_end, stretch
 from weldsim.seam.profile.ends import station_mask
 from weldsim.seam.profile.join import DISTURBED, Piece
-from weldsim.seam.profile.meet import MOST_MISS, Corner, End, alike, meeting_point, round_corner
+from weldsim.seam.profile.meet import MOST_MISS, Corner, End, meeting_point, round_corner
 
 READ = 0.040  # [m] of a piece from which the direction of its end is read
 SHORTEST = 0.030  # [m] a shorter piece has no direction to be carried on in
 CORNER_STEP = 0.0005  # [m] between the points of a corner
+ALIKE = 0.55  # of the larger width and depth, the smaller one of two ends at an edge
 STEEPEST = 0.9  # cosine between a branch and the groove it runs into
 
 Mark = tuple[int, int]
@@ -130,6 +131,11 @@ def _lead(piece: Piece, way: int, off: float) -> Lead | None:
     return Lead(end, first * rail.step, short)
 
 
+def _comparable(a: End, b: End) -> bool:
+    """Whether two ends may be of one groove on two faces: a view blurs it the more, the more it slants; wider or deeper."""
+    return min(a.width, b.width) > ALIKE * max(a.width, b.width) and min(a.depth, b.depth) > ALIKE * max(a.depth, b.depth)
+
+
 def _links(leads: dict[Mark, Lead], config: ProfileConfig) -> dict[Mark, tuple[Mark, Corner]]:
     """For each end that goes on round an edge, where, and the corner that leads there; the nearest ends first."""
     found: list[tuple[float, Mark, Mark, Corner]] = []
@@ -137,7 +143,7 @@ def _links(leads: dict[Mark, Lead], config: ProfileConfig) -> dict[Mark, tuple[M
         one, other = leads[a], leads[b]
         apart = float(np.linalg.norm(one.end.point - other.end.point))
         most = DISTURBED + config.max_filled
-        if a[0] == b[0] or apart > 2 * most or not alike(one.end, other.end):
+        if a[0] == b[0] or apart > 2 * most or not _comparable(one.end, other.end):
             continue
         corner = round_corner(one.end, other.end, config.corner_radius, most, CORNER_STEP)
         if corner is not None:
