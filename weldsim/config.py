@@ -9,7 +9,7 @@ import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +30,18 @@ from weldsim.sensor.stereo_config import D415StereoConfig
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
 
-__all__ = ["CellConfig", "apply_overrides", "describe", "digest", "load_config", "load_scene", "load_toml", "structure", "to_json"]
+__all__ = [
+    "CellConfig",
+    "apply_overrides",
+    "describe",
+    "digest",
+    "limits_for",
+    "load_config",
+    "load_scene",
+    "load_toml",
+    "structure",
+    "to_json",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +80,13 @@ class CellConfig:
 
     report: ReportConfig = field(default_factory=ReportConfig)
     """Limits of the verdict."""
+
+
+def limits_for(config: CellConfig, scene: "SceneConfig") -> ReportConfig:
+    """The limits of the verdict on a scene: its own where it has some and the config leaves the general ones as they are."""
+    general, report = ReportConfig(), config.report
+    own = {name: value for name, value in vars(scene.limits).items() if value is not None}
+    return replace(report, **{name: value for name, value in own.items() if getattr(report, name) == getattr(general, name)})
 
 
 def load_toml(path: str | Path) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from weldsim.cloud.deproject import deproject
 from weldsim.cloud.files import check_plannable
 from weldsim.cloud.filters import prepare
 from weldsim.cloud.views import merge_views
-from weldsim.config import CellConfig, digest
+from weldsim.config import CellConfig, digest, limits_for
 from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, pick, to_weld, unplanned
 from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.plan import plan_paths
@@ -194,7 +194,7 @@ def finish(
             trims=(config.path.start_trim, config.path.end_trim),
             seed=seen.seed,
             config_digest=result.config_digest,
-            config=config.report,
+            config=limits_for(config, world.config),
         )
     report = replace(report, timing=dict(clock.seconds))
     return RunResult(

@@ -13,7 +13,7 @@ import numpy as np
 from weldsim.cloud.depth_output import write_depth_frame
 from weldsim.cloud.files import write_cloud
 from weldsim.cloud.register import Registration
-from weldsim.config import CellConfig, to_json
+from weldsim.config import CellConfig, limits_for, to_json
 from weldsim.errors import OutputError
 from weldsim.output import write_whole
 from weldsim.path.files import path_document, write_path_csv, write_path_json
@@ -85,8 +85,9 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
         write_whole(folder / "scan.npz", tour_bytes(result.tour.logs))
     if result.registration is not None:
         _write_json(folder / "views.json", views_document(result.registration))
-    _write_json(folder / "report.json", report_json(report, config.report))
-    seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": config.report}
+    limits = limits_for(config, scene)
+    _write_json(folder / "report.json", report_json(report, limits))
+    seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": limits}
     write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, **seen)
     write_png(folder / "report.png", report, plan.cloud, plan.findings, plan.paths, **seen)
     if result.log is not None:

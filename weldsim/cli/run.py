@@ -11,8 +11,8 @@ from weldsim.errors import InputError, SensorError
 from weldsim.sensor.choose import SensorName
 
 if TYPE_CHECKING:
-    from weldsim.config import CellConfig
     from weldsim.records import WeldReport
+    from weldsim.report.limits import ReportConfig
 
 MARKS = {True: "ok", False: "FAIL", None: ""}
 
@@ -59,6 +59,7 @@ class Run(ConfigOptions):
         folder = self.out or Path("runs") / f"{scene.name}-{self.seed}"
         self._check(folder)
 
+        from weldsim.config import limits_for
         from weldsim.pipeline import run
         from weldsim.run_folder import check_run_folder, write_run
 
@@ -79,11 +80,12 @@ class Run(ConfigOptions):
             tell("writing", None)
             write_run(folder, result, config, scene, self.seed, self.sensor)
         written = [folder, *([self.video] if self.video is not None and result.log is not None else [])]
+        limits = limits_for(config, scene)
         if self.json:
-            self._print_json(result.report, config, written)
+            self._print_json(result.report, limits, written)
         else:
             self._print(
-                result.report, config, len(result.plan.findings.seams), written, result.motion.notes if result.motion else ()
+                result.report, limits, len(result.plan.findings.seams), written, result.motion.notes if result.motion else ()
             )
         return 0 if result.report.passed else 1
 
@@ -102,17 +104,17 @@ class Run(ConfigOptions):
             raise InputError(f"--out {folder}: give the run directory a name of its own", path=str(folder))
         check_folder(nearest_folder(folder), folder)
 
-    def _print_json(self, report: "WeldReport", config: "CellConfig", written: list[Path]) -> None:
+    def _print_json(self, report: "WeldReport", limits: "ReportConfig", written: list[Path]) -> None:
         from weldsim.report.weld import report_json
 
-        print_json({**report_json(report, config.report), "written": [str(path) for path in written]})
+        print_json({**report_json(report, limits), "written": [str(path) for path in written]})
 
-    def _print(self, report: "WeldReport", config: "CellConfig", found: int, written: list[Path], notes: tuple[str, ...]) -> None:
+    def _print(self, report: "WeldReport", limits: "ReportConfig", found: int, written: list[Path], notes: tuple[str, ...]) -> None:
         from weldsim.report.limits import checks, verdict
 
-        word, why = verdict(report, found, config.report)
+        word, why = verdict(report, found, limits)
         print(f"{report.scene}, seed {report.seed}, {self.sensor}, method {report.method}: {word}, {why}")
-        rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in checks(report, config.report)]
+        rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in checks(report, limits)]
         print(table(rows, ("figure", "measured", "limit", "")))
         for note in notes:
             print(f"  {note}")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from weldsim.errors import ConfigError
 from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerMetre, require_within
 
-DEGREE_PER_MM: RadianPerMetre = 17.453292519943295  # 1 deg/mm
+DEGREE_PER_MM: RadianPerMetre = 17.453292519943295
 STEEPEST: Radian = 1.0471975511965976  # 60 deg
 RANGES = {
     "step": (1e-5, 0.01),
@@ -33,9 +33,9 @@ class PathConfig:
     """Wire axis and travel direction are smoothed over this length (standard deviation of a Gaussian in arc length, fitted
     with local lines so that a steady turn is kept); 0 takes them as the seam has them."""
 
-    turn_limit: RadianPerMetre = DEGREE_PER_MM
-    """Greatest turn of the wire axis per length of seam, before work and travel angle; the default is 1 deg/mm, the turn of
-    a surface bent to a radius of 57 mm. The axis lags where the seam turns faster."""
+    turn_limit: RadianPerMetre = 2 * DEGREE_PER_MM
+    """Greatest turn of the wire axis per length of seam, before work and travel angle; the default is 2 deg/mm, a right angle
+    within 45 mm. Where the seam turns faster, round an edge, the axis begins to turn before it and ends after it."""
 
     work_angle: Radian = 0.0
     """Lean of the torch across travel, away from the seam's bisector: right-handed about travel, so positive leans it to

@@ -46,14 +46,14 @@ def turn(directions: Float[ndarray, "n 3"]) -> Float[ndarray, "n-1"]:
 def limited(s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], rate: RadianPerMetre) -> Float[ndarray, "n 3"]:
     """Unit directions that turn by at most `rate` [rad/m] of arc length, as given wherever they already do.
 
-    A limiter run forwards lags, one run backwards leads: their middle does neither. The last pass makes good what the
-    middle of two directions on a sphere may exceed.
+    A limiter run forwards lags, one run backwards leads: their middle does neither, and turns half as fast as either, so both
+    may turn at twice the rate. The last pass makes good what their middle may exceed.
     """
     steps = rate * np.diff(s)
     if (turn(directions) <= steps).all():
         return directions
-    forwards = _chase(directions, steps)
-    backwards = _chase(directions[::-1], steps[::-1])[::-1]
+    forwards = _chase(directions, 2 * steps)
+    backwards = _chase(directions[::-1], 2 * steps[::-1])[::-1]
     return _chase(unit(forwards + backwards), steps)
 
 

@@ -19,6 +19,8 @@ from weldsim.records import KnownSeam, LineError, Reference, Seam
 
 STEP: Metre = 0.5e-3  # between samples of a line when statistics are taken
 NEAR: Metre = 3e-3  # a known point is covered where the line passes within this of it
+SHARP = 0.3  # [rad] between samples of the known seam: more is a corner
+TURN: Metre = 25e-3  # about a corner of the known seam the wire may point anywhere between both sides' bisectors
 MATCH: Metre = 5e-3  # a found seam belongs to a known one where it lies within this of it
 
 
@@ -109,7 +111,8 @@ def line_error(
     every 0.5 mm. Coverage is the fraction of the length asked for (the known one without the trims) whose perpendicular
     foot the line passes within 3 mm. End errors are along the seam, at the start and end of what was asked for, positive
     where the line runs on; a ring has no known start, and its end error is the overlap. The axis angle is between wire
-    axis and the known inward bisector at the foot.
+    axis and the known inward bisector at the foot; within 25 mm of a corner of the known seam, which a line must round, it
+    is to the nearest direction between the bisectors of both sides.
 
     Args:
         points_B: the line [m], two points or more.  wire_axes_B: unit, towards the work.
@@ -128,8 +131,7 @@ def line_error(
         found = Offsets(s=found.s[::-1], distance=found.distance[::-1], vectors=found.vectors[::-1])
     low, high = (0.0, length - sum(trims)) if known.closed else (trims[0], length - trims[1])
     first, last = float(found.s[0]), float(found.s[-1])
-    bisectors = unit(interpolate(s, known.bisectors_B, found.s % length if known.closed else found.s))
-    angle = np.arctan2(np.linalg.norm(np.cross(axes, bisectors), axis=1), np.einsum("ij,ij->i", axes, bisectors))
+    angle = axis_angle(axes, found.s % length if known.closed else found.s, s, known.bisectors_B)
     return LineError(
         mean=float(found.distance.mean()),
         rms=float(np.sqrt(np.mean(found.distance**2))),
@@ -142,6 +144,25 @@ def line_error(
         axis_p95=float(np.percentile(angle, 95)),
         reference=reference,
     )
+
+
+def axis_angle(
+    axes: Float[ndarray, "m 3"], at: Float[ndarray, "m"], s: Float[ndarray, "n"], bisectors: Float[ndarray, "n 3"]
+) -> Float[ndarray, "m"]:
+    """Angles [rad] between wire axes and the known bisectors at arc lengths `at`, corners as `line_error` says."""
+    angle = _between(axes, unit(interpolate(s, bisectors, at)))
+    for turn in np.flatnonzero(_between(bisectors[:-1], bisectors[1:]) > SHARP):
+        near = np.flatnonzero((at >= s[turn] - TURN) & (at <= s[turn + 1] + TURN))
+        # The known seam may hold one sample in the corner itself, between the bisectors of both sides.
+        before, after = bisectors[max(turn - 1, 0)], bisectors[min(turn + 2, len(s) - 1)]
+        blend = np.linspace(0.0, 1.0, 91)[:, None]
+        for direction in unit((1.0 - blend) * before + blend * after):
+            angle[near] = np.minimum(angle[near], _between(axes[near], direction[None]))
+    return angle
+
+
+def _between(a: Float[ndarray, "#m 3"], b: Float[ndarray, "#m 3"]) -> Float[ndarray, "k"]:
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
 
 
 def coverage(found: Offsets, low: Metre, high: Metre, *, ring: Metre | None = None, near: Metre = NEAR) -> float:

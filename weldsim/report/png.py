@@ -24,6 +24,7 @@ from weldsim.report.view import MARGIN, CrossSection, cross_section, error_lines
 
 EMPTY = "#eef1f4"
 OBLIQUE = np.array([0.25, 0.55])
+LAYER = 0.03  # [m] points this far below another in their pixel are hidden by it
 RATIO = 0.72  # height of the plan view over its width
 PIXEL = 1e-3  # [m] of the plan view
 
@@ -91,7 +92,7 @@ def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFind
     window = _window(points, [X_SB.points(seam.points_B) for seam in findings.seams])
     seen = ((points[:, :2] >= window[0]) & (points[:, :2] <= window[1])).all(axis=1)
     height = heights(cloud.points[seen], findings.seams, X_BS)
-    image, extent = _height_image(points[seen, :2], height)
+    image, extent = _height_image(points[seen], height)
     low, high = height_range(height, findings.seams)
     drawn = axes.imshow(
         1e3 * image, extent=extent, origin="lower", cmap="cividis", vmin=1e3 * low, vmax=1e3 * high, interpolation="nearest"
@@ -158,14 +159,22 @@ def _trace(axes: Axes, X_SB: Transform, points_B: ndarray, colour: str, width: f
     axes.plot(x, y, style, color=colour, lw=width, label=label)
 
 
-def _height_image(places: ndarray, height: ndarray) -> tuple[ndarray, tuple[float, float, float, float]]:
-    """Mean height of each pixel [m], NaN where the cloud has none, and its extent [mm]."""
+def _height_image(points: ndarray, height: ndarray) -> tuple[ndarray, tuple[float, float, float, float]]:
+    """Mean height of the uppermost layer in each pixel [m], NaN where the cloud has none, and its extent [mm].
+
+    Other views may have seen what lies below the surface drawn, a table under a box say: that is hidden here.
+    """
+    places = points[:, :2]
     low, high = places.min(axis=0), places.max(axis=0)
     # A sparse cloud gets larger pixels, so that it still covers the picture.
     pixel = max(PIXEL, float(np.sqrt(5 * np.prod(high - low) / len(places))))
     shape = np.maximum(1, np.ceil((high - low) / pixel).astype(int))
     column, row = np.minimum(((places - low) / pixel).astype(int), shape - 1).T
     flat = row * shape[0] + column
+    top = np.full(shape.prod(), -np.inf)
+    np.maximum.at(top, flat, points[:, 2])
+    upper = points[:, 2] > top[flat] - LAYER
+    flat, height = flat[upper], height[upper]
     count = np.bincount(flat, minlength=shape.prod())
     total = np.bincount(flat, height, minlength=shape.prod())
     image = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape[1], shape[0])

@@ -95,6 +95,24 @@ class MaterialConfig:
 
 
 @dataclass(frozen=True)
+class LimitsConfig:
+    """What a weld of this scene must keep to where that is not what welds in general must: corners are rounded, say.
+
+    Attributes:
+        mean: cross-track distance from the known seam, mean [m].
+        p95: the same, 95th percentile [m].
+        max: the same, greatest [m].
+    """
+
+    mean: Metre | None = None
+    p95: Metre | None = None
+    max: Metre | None = None
+
+    def __post_init__(self) -> None:
+        require_within(self, {name: (0.0, 1.0) for name, value in vars(self).items() if value is not None}, "limits")
+
+
+@dataclass(frozen=True)
 class SceneConfig:
     """One scene.
 
@@ -113,6 +131,7 @@ class SceneConfig:
         fixture: what holds it.
         material: how it looks.
         views: where the wrist camera scans from, in order; one at least.
+        limits: of the verdict, in place of the general ones.
     """
 
     name: str = "scene"
@@ -129,6 +148,7 @@ class SceneConfig:
     fixture: FixtureConfig = field(default_factory=FixtureConfig)
     material: MaterialConfig = field(default_factory=MaterialConfig)
     views: tuple[ViewConfig, ...] = (ViewConfig(),)
+    limits: LimitsConfig = field(default_factory=LimitsConfig)
 
 
 def make_workpiece(config: SceneConfig) -> Workpiece:

@@ -58,7 +58,7 @@ class ProfileConfig:
     max_side_step: Metre = 0.003
     max_gap: Metre = 0.045
     max_filled: Metre = 0.025
-    corner_radius: Metre = 0.005
+    corner_radius: Metre = 0.003
     detection_factor: float = 4.0
     points_per_metre: float = 100_000.0
 
