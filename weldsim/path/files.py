@@ -172,6 +172,7 @@ def _seam_entry(number: int, seam: Seam, path: TorchPath) -> dict[str, Any]:
         "closed": seam.closed,
         "length": round(seam.length, DECIMALS),
         "width": round(float(seam.width), DECIMALS),
+        **({"step": round(float(seam.step), DECIMALS)} if seam.step else {}),
         "confidence": round(float(seam.confidence), DECIMALS),
         # One speed for a seam: a weave's faster tip is made by the path, its travel speed is the median.
         "speed": round(float(np.median(path.speed[weld])), DECIMALS),

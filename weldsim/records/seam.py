@@ -28,6 +28,7 @@ class Seam:
         sigma: (n,) standard deviation of the centre line across the seam [m], or None where the method gives none.
         width: mean distance between the lips [m].
         depth: mean depth of the root below the opening, as the sensor showed it [m]; None where not measured.
+        step: how much higher the left lip lies than the right one [m]; 0 where the method sees none.
         residual: rms distance of the data from the fitted cross-sections [m].
         confidence: 0 to 1.
         joint, reference: which kind of joint, and which line of it `points_B` follows.
@@ -45,6 +46,7 @@ class Seam:
     sigma: Float[ndarray, "n"] | None = None
     width: float = 0.0
     depth: float | None = None
+    step: float = 0.0
     residual: float = 0.0
     confidence: float = 0.0
     joint: Joint = "groove"

@@ -153,6 +153,8 @@ def _cards(report: WeldReport, findings: SeamFindings) -> str:
         cards.append((f"{units.to_mm(seam.length):.1f} mm", "length"))
         if seam.width > 0:  # a method that measures none leaves 0
             cards.append((f"{units.to_mm(seam.width):.1f} mm", "width of the opening"))
+        if seam.step:
+            cards.append((f"{units.to_mm(seam.step):+.1f} mm", "left lip above the right one"))
         if seam.confidence > 0:
             cards.append((f"{seam.confidence:.2f}", "confidence"))
         if seam.sigma is not None:

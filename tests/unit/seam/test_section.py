@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weldsim.seam.profile.section import Section, fit_section
+from weldsim.seam.profile.lean import first_section, settled_section
+from weldsim.seam.profile.section import Section
+from weldsim.seam.profile.views import Blocks
 
 X = np.arange(-0.030, 0.030, 0.0005) + 0.00025
 
@@ -14,9 +16,18 @@ def section(**changes: float) -> Section:
     return replace(Section(middle=0.0, width=0.014, depth=0.008, floor=0.0, lean=0.0, blur=0.003), **changes)
 
 
+def seen_at(shape: Section, x: np.ndarray, shear: float) -> np.ndarray:
+    return shape.image(x, np.array([shear]))[0][0]
+
+
 def fine_area(shape: Section, shear: float) -> float:
     x = np.linspace(-0.05, 0.05, 20_001)
-    return float(shape.depth_at(x, np.full_like(x, shear)).sum() * (x[1] - x[0]))
+    return float(seen_at(shape, x, shear).sum() * (x[1] - x[0]))
+
+
+def blocks_of(truth: Section, shear: np.ndarray, noise: float, rng: np.random.Generator) -> Blocks:
+    depth = truth.image(X, shear)[0] + rng.normal(0.0, noise, (len(shear), len(X)))
+    return Blocks(X, depth, np.full(depth.shape, 8.0), shear, 8)
 
 
 @pytest.mark.parametrize("shear", [0.0, 0.2, -0.45])
@@ -38,11 +49,29 @@ def test_a_sharp_section_has_its_own_area(width: float, floor: float) -> None:
 
 @pytest.mark.parametrize("blur", [0.0, 0.004, 0.008])
 def test_a_symmetric_groove_seen_straight_on_is_symmetric(blur: float) -> None:
-    none = np.zeros_like(X)
-    for floor, most in ((0.05, 1e-9), (0.0, 6e-5)):  # a V's own bottom is 50 um wide, and off the middle by half of it
+    for floor in (0.05, 0.0):
         shape = section(blur=blur, middle=0.0013, floor=floor)
-        left, right = shape.depth_at(0.0013 + X, none), shape.depth_at(0.0013 - X, none)
-        np.testing.assert_allclose(left, right, atol=most)
+        left, right = seen_at(shape, 0.0013 + X, 0.0), seen_at(shape, 0.0013 - X, 0.0)
+        np.testing.assert_allclose(left, right, atol=1e-9)
+
+
+@pytest.mark.parametrize("shear", [-0.6, 0.0, 0.4])
+def test_plates_at_two_heights_lie_half_a_step_above_and_below_the_opening(shear: float) -> None:
+    for step in (-0.002, 0.0015):
+        seen = seen_at(section(step=step), X, shear)
+        np.testing.assert_allclose(seen[-10:], -step / 2, atol=1e-12)
+        np.testing.assert_allclose(seen[:10], step / 2, atol=1e-12)
+
+
+def test_the_slope_of_an_image_is_what_a_small_shift_changes() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        shape = section(
+            width=rng.uniform(0.006, 0.025), lean=rng.uniform(-0.002, 0.002), blur=rng.uniform(0.002, 0.008), step=0.001
+        )
+        shear = np.array([rng.uniform(-0.8, 0.8)])
+        ahead, behind = (replace(shape, middle=d).image(X, shear)[0] for d in (1e-7, -1e-7))
+        np.testing.assert_allclose((ahead - behind) / 2e-7, shape.image(X, shear)[1], atol=2e-3)
 
 
 def test_mirrored_views_show_mirrored_sections() -> None:
@@ -55,9 +84,9 @@ def test_mirrored_views_show_mirrored_sections() -> None:
             lean=rng.uniform(-0.003, 0.003),
             blur=rng.uniform(0, 0.008),
         )
-        shear = np.full_like(X, rng.uniform(-1.2, 1.2))
-        seen = shape.depth_at(X, shear)
-        mirrored = replace(shape, lean=-shape.lean).depth_at(-X, -shear)
+        shear = rng.uniform(-1.2, 1.2)
+        seen = seen_at(shape, X, shear)
+        mirrored = seen_at(replace(shape, lean=-shape.lean), -X, -shear)
         np.testing.assert_allclose(mirrored, seen, atol=1e-9)
         assert (seen >= -1e-9).all()
         assert (seen <= shape.depth + 1e-9).all()
@@ -66,36 +95,46 @@ def test_mirrored_views_show_mirrored_sections() -> None:
 def test_moving_the_middle_moves_the_section() -> None:
     rng = np.random.default_rng(1)
     for shift in rng.uniform(-0.004, 0.004, 8):
-        shape, shear = section(lean=0.001), np.full_like(X, 0.3)
-        np.testing.assert_allclose(replace(shape, middle=shift).depth_at(X + shift, shear), shape.depth_at(X, shear), atol=1e-12)
+        shape = section(lean=0.001)
+        np.testing.assert_allclose(seen_at(replace(shape, middle=shift), X + shift, 0.3), seen_at(shape, X, 0.3), atol=1e-12)
 
 
 @pytest.mark.parametrize("width", [0.008, 0.014, 0.022])
 @pytest.mark.parametrize("shear", [-0.3, 0.0, 0.2])
 def test_the_middle_of_the_lips_is_recovered_from_noisy_slanted_profiles(width: float, shear: float) -> None:
     """A centroid would be drawn towards one wall by `depth * shear / 3`: 0.8 mm at a shear of 0.3."""
-    blocks, errors = 24, []
-    block = np.repeat(np.arange(blocks), len(X))
-    x = np.tile(X, blocks)
+    errors = []
     for seed in range(4):
         rng = np.random.default_rng([seed, int(width * 1e4)])
-        slant = shear + np.repeat(rng.uniform(-0.05, 0.05, blocks), len(X))
         truth = section(middle=rng.uniform(-5e-4, 5e-4), width=width, depth=0.5 * width, floor=0.1, blur=0.004)
-        depth = truth.depth_at(x, slant) + rng.normal(0.0, 2e-4, x.shape)
-        start = section(width=1.2 * width, depth=0.4 * width)
-        found, sigma = fit_section(x=x, shear=slant, depth=depth, weight=np.ones_like(x), start=start, block=block, noise=2e-4)
+        blocks = blocks_of(truth, shear + rng.uniform(-0.05, 0.05, 24), 2e-4, rng)
+        start = first_section(blocks, section(width=1.2 * width, depth=0.4 * width), 5e-5)
+        found, sigma = settled_section(blocks, start, 5e-5)
         errors.append(found.middle - truth.middle)
         assert 0 < sigma < 1e-3
         assert abs(found.width - width) < 0.15 * width
     assert np.abs(errors).max() < 6e-5
 
 
-def test_a_leaning_groove_is_seen_to_lean() -> None:
+@pytest.mark.parametrize("lean", [-0.006, -0.002, 0.002, 0.006])
+def test_a_leaning_groove_is_seen_to_lean(lean: float) -> None:
     rng = np.random.default_rng(2)
-    blocks = 24
-    block, x = np.repeat(np.arange(blocks), len(X)), np.tile(X, blocks)
-    truth, none = section(lean=0.002, middle=0.0004), np.zeros(len(X) * blocks)
-    depth = truth.depth_at(x, none) + rng.normal(0.0, 1e-4, x.shape)
-    found, _ = fit_section(x=x, shear=none, depth=depth, weight=np.ones_like(x), start=section(), block=block, noise=1e-4)
+    truth = section(lean=lean, middle=0.0004)
+    blocks = blocks_of(truth, np.zeros(24), 1e-4, rng)
+    found, sigma = settled_section(blocks, first_section(blocks, section(), 5e-5), 5e-5)
     assert found.lean == pytest.approx(truth.lean, abs=2e-4)
     assert found.middle == pytest.approx(truth.middle, abs=1e-4)
+    assert abs(found.middle - truth.middle) < 3 * sigma
+
+
+def test_a_lean_that_noise_hides_is_doubted() -> None:
+    """Few blurred noisy blocks: the deviation is of the size of the error, mostly; a symmetric groove stays likelier."""
+    scores = []
+    for seed in range(12):
+        rng = np.random.default_rng([seed, 7])
+        truth = section(width=0.010, depth=0.005, lean=rng.choice([-1, 1]) * 0.0045, blur=0.007)
+        blocks = blocks_of(truth, np.zeros(8), 4e-4, rng)
+        found, sigma = settled_section(blocks, first_section(blocks, section(width=0.012, depth=0.004), 5e-5), 5e-5)
+        scores.append(abs(found.middle - truth.middle) / sigma)
+    assert np.median(scores) < 3
+    assert max(scores) < 5

@@ -96,7 +96,9 @@ def _walk(
         mark, corner = links[out]
         widths = np.array([pieces[k].fit.section.width, pieces[mark[0]].fit.section.width])
         u = np.linspace(0.0, 1.0, len(corner.points))
-        parts.append(Course(corner.points, corner.normals, corner.sigma, np.interp(u, [0.0, 1.0], widths)))
+        steps = np.array([parts[-1].step[-1], -mark[1] * pieces[mark[0]].fit.section.step])
+        width, step = (np.interp(u, [0.0, 1.0], each) for each in (widths, steps))
+        parts.append(Course(corner.points, corner.normals, corner.sigma, width, step))
     if out in tails:
         parts.append(tails[out].course)
     return end_to_end(parts)
@@ -225,4 +227,5 @@ def _straight_on(lead: Lead, middle: Float[ndarray, "3"]) -> Course:
         normals=np.repeat(end.normal[None], number, 0),
         sigma=np.hypot(end.sigma, u * length * end.turn),
         width=np.full(number, end.width),
+        step=np.zeros(number),  # where branches meet, their plates are one
     )

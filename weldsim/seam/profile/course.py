@@ -21,6 +21,7 @@ class Course:
     """Attributes:
     points: (n, 3) in order of travel [m].  normals: (n, 3) unit, outward of the parent surface.
     sigma: (n,) standard deviation across the line [m].  width: (n,) between the lips [m].
+    step: (n,) how much higher the left lip lies than the right one [m].
     gaps: stretches of arc length (s0, s1) [m] over which no groove was seen.
     pieces: those it was made of.
     """
@@ -29,6 +30,7 @@ class Course:
     normals: Float[ndarray, "n 3"]
     sigma: Float[ndarray, "n"]
     width: Float[ndarray, "n"]
+    step: Float[ndarray, "n"]
     gaps: tuple[tuple[float, float], ...] = ()
     pieces: tuple[Piece, ...] = ()
 
@@ -40,8 +42,9 @@ class Course:
     def reversed(self) -> "Course":
         """The same line, travelled the other way."""
         whole = self.length
-        turned = replace(self, **{name: getattr(self, name)[::-1] for name in ("points", "normals", "sigma", "width")})
-        return replace(turned, gaps=tuple((whole - s1, whole - s0) for s0, s1 in self.gaps[::-1]), pieces=self.pieces[::-1])
+        turned = replace(self, **{name: getattr(self, name)[::-1] for name in ("points", "normals", "sigma", "width", "step")})
+        gaps = tuple((whole - s1, whole - s0) for s0, s1 in self.gaps[::-1])
+        return replace(turned, step=-turned.step, gaps=gaps, pieces=self.pieces[::-1])
 
 
 def stretch(piece: Piece, start: float, stop: float) -> Course:
@@ -59,6 +62,7 @@ def stretch(piece: Piece, start: float, stop: float) -> Course:
         normals=unit(interpolate(at, rail.n, stations)),
         sigma=np.interp(stations, at, fit.sigma),
         width=np.full(len(points), fit.section.width),
+        step=np.full(len(points), fit.section.step),
         gaps=tuple((float(np.interp(s0, stations, s)), float(np.interp(s1, stations, s))) for s0, s1 in unseen if s1 > s0),
         pieces=(piece,),
     )
@@ -76,6 +80,7 @@ def end_to_end(parts: Sequence[Course]) -> Course:
             normals=np.concatenate([course.normals, part.normals[first:]]),
             sigma=np.concatenate([course.sigma, part.sigma[first:]]),
             width=np.concatenate([course.width, part.width[first:]]),
+            step=np.concatenate([course.step, part.step[first:]]),
             gaps=course.gaps + tuple((offset + s0, offset + s1) for s0, s1 in part.gaps),
             pieces=course.pieces + part.pieces,
         )
@@ -91,7 +96,7 @@ def to_seam(course: Course, sure: float) -> Seam:
     points = course.points
     t, s = tangents(points), arc_length(points)
     n = unit(course.normals - np.einsum("ij,ij->i", course.normals, t)[:, None] * t)
-    aside = 0.5 * course.width[:, None] * np.cross(n, t)
+    lip = 0.5 * (course.width[:, None] * np.cross(n, t) + course.step[:, None] * n)
     share = np.array([piece.span[1] - piece.span[0] for piece in course.pieces])
     sections = np.array([(piece.fit.section.width, piece.fit.section.depth, piece.fit.parent.noise) for piece in course.pieces])
     width, depth, noise = (share @ sections / share.sum()).tolist()
@@ -100,11 +105,12 @@ def to_seam(course: Course, sure: float) -> Seam:
         s=s,
         tangents_B=t,
         normals_B=n,
-        left_B=points + aside,
-        right_B=points - aside,
+        left_B=points + lip,
+        right_B=points - lip,
         sigma=course.sigma,
         width=width,
         depth=depth,
+        step=float(course.step.mean()),
         residual=noise,
         confidence=sure,
         gaps=tuple((max(s0, 0.0), min(s1, float(s[-1]))) for s0, s1 in course.gaps),

@@ -62,14 +62,14 @@ def piece_end(piece: Piece, way: int) -> End:
     # A parabola from the end inward, through what lies clear of a clamp's foot: that lifts the parent surface it stands on.
     curve = np.polynomial.polynomial.polyfit(place[read], rail.points[index[read]], 2)
     sigma = float(fit.sigma[index].mean())
-    reach = float(np.ptp(place[read]))
+    turn = 4 * sigma / max(float(np.ptp(place[read])), rail.step)
     return End(
         point=curve[0],
         direction=unit(-curve[1]),
         normal=rail.n[index[read][0]],
         bend=2 * curve[2],
-        sigma=sigma,
-        turn=4 * sigma / max(reach, rail.step),
+        sigma=float(np.hypot(sigma, skip * turn)),  # the end itself was carried over what was not read
+        turn=turn,
         width=fit.section.width,
         depth=fit.section.depth,
     )

@@ -51,7 +51,7 @@ def confidence(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> fl
 
 def _shown_depth(fit: Fit) -> float:
     """Greatest depth of the blurred section [m]."""
-    return float(np.max(fit.section.depth_at(fit.grid.x, np.full_like(fit.grid.x, float(np.median(fit.grid.shear))))))
+    return float(np.max(fit.section.image(fit.grid.x, np.median(fit.grid.shear, keepdims=True))[0]))
 
 
 def _lapses(fit: Fit, span: tuple[float, float]) -> float:

@@ -14,25 +14,31 @@ WINDOW = 0.020  # [m] along the seam, over which the two sides are compared
 STIFFNESSES = (0.02, 0.5, 10.0, 200.0, 4000.0)  # of the penalty on roughness, relative to the data between two knots
 FOLD = 0.030  # [m] along the seam, left out together to choose the stiffness
 LEVER = 0.020  # [m] that turns twist into height
+HILO_SCORE = 4.0  # standard deviations
+ALIKE = 15.0  # cells
+HILO_LEAST = 2.5e-4  # [m] misalignment in height that is worth a term of its own
 KNOT = 0.025  # [m] spacing of the knots of the surface's height along the seam
 
 
 @dataclass(frozen=True, eq=False)
 class Parent:
-    """h(s, x) = a(s) + b(s) x + c x^2 in a rail's coordinates.
+    """h(s, x) = a(s) + b(s) x + c x^2 + hilo sign(x) / 2 in a rail's coordinates.
 
     Attributes:
         a, b: (m,) at each station [m], [1].  c: curvature term [1/m].
+        hilo: how much higher the plate on the left lies than the one on the right [m]; 0 unless the data insist.
         noise: robust standard deviation of the cells about it [m].
-    rms: root mean square of the cells about it [m]; unlike `noise` not blind to data that jump between whole steps.
-    sigma: standard deviation of its height at the groove [m], with the noise's own correlation.
+        rms: root mean square of the cells about it [m]; unlike `noise` not blind to data that jump between whole steps.
+        sigma: standard deviation of its height at the groove [m], with the noise's own correlation.
         step, angle: (m,) height difference [m] and angle [rad] between the surfaces left and right of each station, each
         carried to its middle; infinity where either is missing.
+        support: (m, 2) share of parent surface left and right.  cells: (k, 2) (s, x) of what lies within TOLERANCE of it [m].
     """
 
     a: Float[ndarray, "m"]
     b: Float[ndarray, "m"]
     c: float
+    hilo: float
     noise: float
     rms: float
     sigma: float
@@ -55,37 +61,87 @@ def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float, reach: floa
     design = _design(s, x, length, knots)
     penalty, target = _roughness(rail, knots)
     penalty, target = penalty * len(s) / knots, target * len(s) / knots
-    stiffness, scale = STIFFNESSES[2], 0.003
-    weight = np.ones(len(s))
-    theta, residual = np.zeros(design.shape[1]), h
-    for turn in range(8):
-        if turn == 4:
-            stiffness = _choose_stiffness(design, h, weight, penalty, target, np.floor(s / FOLD).astype(int) % 4)
-        theta = _solve(design, h, weight, stiffness * penalty, stiffness * target)
-        residual = h - design @ theta
-        spread = 1.4826 * float(np.median(np.abs(residual)[weight > 0.05])) if (weight > 0.05).any() else scale
-        scale = max(0.6 * scale, 1.5 * spread, 1e-5)
-        weight = np.maximum(1 - (residual / (3 * scale)) ** 2, 0.0) ** 2
+    fold = np.floor(s / FOLD).astype(int)
+    theta, weight, scale = _robust(design, h, penalty, target, fold)
+    hilo = 0.0
+    side = np.sign(x) / 2
+    if _insists(design, h - design @ theta, weight, side, fold):
+        wider = np.concatenate([design, side[:, None]], axis=1)
+        theta, weight, scale = _robust(wider, h, np.pad(penalty, (0, 1)), np.pad(target, (0, 1)), fold)
+        theta, hilo = theta[:-1], float(theta[-1])
+    residual = h - design @ theta - hilo * side
     good = np.abs(residual) < min(3 * scale, TOLERANCE)
+    # Where a plate ends, a camera is at its noisiest: what lies within the tolerance still shows that it goes on.
+    plate = np.abs(residual) < TOLERANCE
     noise = 1.4826 * float(np.median(np.abs(residual[good]))) if good.any() else scale
     at = np.arange(m) * rail.step
     basis, size = _basis(at, length, knots), knots + 2
     # Curvature across the seam is part of the angle between the sides, as far as neither side bends by itself: it could
     # pass a fold off as a bend.
     folded = theta[-1] - _own_curvature(s, x, residual, good, float(theta[-1]))
-    step, angle = _side_difference(s, x, residual + folded * x**2, np.abs(residual) < 2 * TOLERANCE, m, rail.step)
+    apart = residual + folded * x**2 + hilo * side
+    step, angle = _side_difference(s, x, apart, np.abs(residual) < 2 * TOLERANCE, m, rail.step)
     return Parent(
         a=basis @ theta[:size],
         b=basis @ theta[size : 2 * size],
         c=float(theta[-1]),
+        hilo=hilo,
         noise=noise,
         rms=float(np.sqrt(np.mean(residual[good] ** 2))) if good.any() else scale,
         sigma=_height_sigma(s[good], x[good], residual[good]),
         step=step,
         angle=angle,
         support=_support(s, x, good, m, rail.step, outer - inner),
-        cells=np.stack([s[good], x[good]], axis=1),
+        cells=np.stack([s[plate], x[plate]], axis=1),
     )
+
+
+def _robust(
+    design: Float[ndarray, "k p"],
+    h: Float[ndarray, "k"],
+    penalty: Float[ndarray, "p p"],
+    target: Float[ndarray, "p"],
+    fold: Int[ndarray, "k"],
+) -> tuple[Float[ndarray, "p"], Float[ndarray, "k"], float]:
+    """Coefficients, weights and scale [m] of the reweighted fit; the stiffness is chosen on the way."""
+    stiffness, scale = STIFFNESSES[2], 0.003
+    weight = np.ones(len(h))
+    theta = np.zeros(design.shape[1])
+    for turn in range(8):
+        if turn == 4:
+            stiffness = _choose_stiffness(design, h, weight, penalty, target, fold % 4)
+        theta = _solve(design, h, weight, stiffness * penalty, stiffness * target)
+        residual = h - design @ theta
+        spread = 1.4826 * float(np.median(np.abs(residual)[weight > 0.05])) if (weight > 0.05).any() else scale
+        scale = max(0.6 * scale, 1.5 * spread, 1e-5)
+        weight = np.maximum(1 - (residual / (3 * scale)) ** 2, 0.0) ** 2
+    return theta, weight, scale
+
+
+def _insists(
+    design: Float[ndarray, "k p"],
+    residual: Float[ndarray, "k"],
+    weight: Float[ndarray, "k"],
+    side: Float[ndarray, "k"],
+    fold: Int[ndarray, "k"],
+) -> bool:
+    """Whether the residuals ask for a height step between the plates: by HILO_SCORE standard deviations, and HILO_LEAST.
+
+    The step's column is made orthogonal to the surface's; the deviation is taken from stretch to stretch of the seam.
+    """
+    weighted = design * weight[:, None]
+    gram = design.T @ weighted
+    gram[np.diag_indices_from(gram)] += 1e-9 * (np.diag(gram) + 1e-6)
+    free = side - design @ np.linalg.solve(gram, weighted.T @ side)
+    strength = float(weight @ (free * free))
+    if strength <= 0:
+        return False
+    step = float((weight * free) @ residual) / strength
+    left = residual - step * free
+    votes = np.bincount(fold, weights=weight * free * left)
+    # Few stretches may agree by chance: no less than from patches over which a stereo camera's noise is alike.
+    patches = ALIKE * float((weight * free**2) @ left**2)
+    return abs(step) > max(HILO_SCORE * float(np.sqrt(max((votes**2).sum(), patches))) / strength, HILO_LEAST)
 
 
 def _cells(strip: Strip, band: Bool[ndarray, "k"], length: float, outer: float) -> tuple[ndarray, ndarray, ndarray, ndarray]:

@@ -1,6 +1,7 @@
 """One candidate groove, from a coarse line to a fitted one: rail, parent surface, cross-section, lateral track."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -9,24 +10,29 @@ from numpy import ndarray
 from weldsim.curves import resample
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.grid import Grid, make_grid
+from weldsim.seam.profile.lean import first_section, follow_section, settled_section
 from weldsim.seam.profile.parent import Parent, fit_parent
 from weldsim.seam.profile.rail import Rail, lay_out, make_rail, shift_rail
-from weldsim.seam.profile.section import Section, fit_section
+from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
 from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
+from weldsim.seam.profile.views import Blocks
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
 BLOCK = 8  # stations averaged together for the cross-section fit
-LOOK = 0.25  # how much of an independent look one cell of such a block is worth: noise is shared over about 3.5 mm
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
 FEWEST_CELLS = 40  # fewer do not fix a cross-section
 MOST_TURNS = 6
 LEVELLING = 2  # turns in which the rail, seen upright at first, is stood on the parent surface
 STEEP = 0.9  # [rad] that the two sides may differ before that
+QUIETEST = 2e-4  # [m] least standard deviation of a cell: on a wall it depends on where in the cell its points lie
+WIDEST_FOOTPRINT = 1.2  # of the camera's window on a surface seen at 35 deg, over one that faces it
 SETTLED = 2e-4  # [m] a rail that moves less than this is done
 BRIDGE = 0.010  # [m] a groove goes on across this without being seen
 NEAR_RAIL = 0.008  # [m] above and below a rail that lies on the parent surface; a clamp at the end of one is higher
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
+
+Stage = Literal["first", "following", "settled"]  # how far a section is looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +97,7 @@ def refine(
         return None
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
-    return _settled(_measure(rail, section, every, every_origin, config, first=True), every, every_origin, config, BRIDGE)
+    return _settled(_measure(rail, section, every, every_origin, config, "first"), every, every_origin, config, BRIDGE)
 
 
 def resume(
@@ -129,7 +135,11 @@ def _settled(
         measured = _measure(rail, before.section, points, origins, config)
         if measured is not None and measured.moved < SETTLED and measured.reach(bridge) <= before.reach(bridge) + 2:
             break
-    return None if measured is None else _concluded(measured, bridge)
+    if measured is None:
+        return None
+    rail = _advance(measured.rail, measured.parent, measured.section, measured.offset, measured.track.weight > 0, bridge)
+    measured = _measure(rail, measured.section, points, origins, config, "settled") or measured
+    return _concluded(measured, bridge)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,17 +178,19 @@ def _measure(
     points: Float[ndarray, "n 3"],
     origins: Float[ndarray, "n 3"] | None,
     config: ProfileConfig,
-    first: bool = False,
+    stage: Stage = "following",
 ) -> Measurement | None:
     """Parent surface, section and track along a rail, or None where hardly any groove is seen."""
     strip = lay_out(rail, points, origins)
-    inner = 0.5 * start.width + 0.7 * start.blur + 0.001
+    blur = start.blur * WIDEST_FOOTPRINT
+    inner = 0.5 * start.width + 0.7 * blur + 0.001
     parent = fit_parent(rail, strip, inner, inner + config.side_band, NEAR_RAIL)
-    grid = make_grid(rail, strip, parent, 0.5 * start.width + start.blur + 0.006)
+    grid = make_grid(rail, strip, parent, 0.5 * start.width + blur + 0.006)
+    start = replace(start, step=parent.hilo)
     flanked = sided(parent, config)
-    section, doubt = _fit_grid(grid, flanked, parent.noise, start, first)
-    section = replace(section, middle=0.0)
+    section, doubt = _fit_grid(grid, flanked, parent.noise, start, stage)
     track = follow(grid, section, flanked, attached(parent))
+    section = replace(section, middle=0.0)
     if np.count_nonzero(track.weight) < FEWEST_STATIONS:
         return None
     offset, strength = smoothed(rail, track)
@@ -279,15 +291,14 @@ def _first_section(
     return section, offset, seen
 
 
-def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, first: bool) -> tuple[Section, float]:
+def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, float]:
     """The section fitted to blocks of stations, each with its own shear, and its middle's standard deviation [m]."""
     m = len(grid.depth) // BLOCK
     use = grid.depth[: m * BLOCK].reshape(m, BLOCK, -1)
     known = np.isfinite(use)
     number = known.sum(axis=1)
     mean = np.where(known, use, 0.0).sum(axis=1) / np.maximum(number, 1)
-    shear = np.repeat(grid.shear[: m * BLOCK].reshape(m, BLOCK).mean(axis=1)[:, None], mean.shape[1], axis=1)
-    x = np.broadcast_to(grid.x, mean.shape)
+    shear = grid.shear[: m * BLOCK].reshape(m, BLOCK).mean(axis=1)
     # Only blocks that hold a groove of about the usual depth shape the section: ends and gaps would blunt it.
     inside = np.abs(grid.x) < 0.25 * start.width
     height = (mean * number)[:, inside].sum(axis=1) / np.maximum(number[:, inside].sum(axis=1), 1)
@@ -296,9 +307,10 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
         return start, 0.0
     typical = np.median(height[candidates])
     keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
-    rows = np.repeat(keep[:, None], mean.shape[1], axis=1) & (number > 0)
-    weight = LOOK * number[rows] / BLOCK
-    if np.count_nonzero(rows) < FEWEST_CELLS:
+    if not keep.any() or np.count_nonzero(number[keep]) < FEWEST_CELLS:
         return start, 0.0
-    block = np.broadcast_to(np.arange(m)[:, None], mean.shape)[rows]
-    return fit_section(x[rows], shear[rows], mean[rows], weight, start, block, max(noise, 5e-5), first=first)
+    blocks = Blocks(grid.x, mean[keep], number[keep].astype(float), shear[keep], BLOCK)
+    least = max(noise, QUIETEST)
+    if stage == "settled":
+        return settled_section(blocks, start, least)
+    return (first_section if stage == "first" else follow_section)(blocks, start, least), 0.0

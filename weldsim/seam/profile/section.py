@@ -5,20 +5,16 @@ planes stay planes (inverse depth). A sheared trapezoid stays piecewise linear t
 window blurs it symmetrically: so the midpoint of the lips is not drawn towards either wall, as a centroid is.
 """
 
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray
-from scipy.optimize import least_squares
 
-LEAN_SCORE = 3.6  # standard deviations by which a lean must stand out from block to block
-FIRST_STARTS = ((4e-4, 0.1), (4e-3, 0.1), (4e-4, 0.7))  # blur [m], floor
-POOR_FIT = 0.3  # a symmetric section that leaves more than this may be hiding a leaning one
-LEAN_GAIN = 0.5  # a lean that halves the cost needs no vote
-LIKELY_LEAN = 0.02  # of the width: the standard deviation of a lean that went unnoticed
 EDGE = 5e-5  # [m] width given to a vertical wall
+SHARPEST = 4e-4  # [m] a narrower window is not told from none by cells of half a millimetre
+NARROWEST = 0.05  # of the wider box
+LEVELS = 12  # shears at which a whole image is evaluated; between them it is interpolated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +25,9 @@ class Section:
         middle: midpoint of the lips [m].  width: between the lips [m].  depth: of the bottom [m].
         floor: width of the bottom over `width`, 0 = V, towards 1 = square.
         lean: how far the bottom's middle is to the left of the lips' [m].
-        blur: width of the camera's support window on the surface [m].
+        blur: width of the camera's support window on a surface that faces it [m].
+        taper: of the blur: 0 = a box, as where the groove runs along the image's rows or columns, 1 = a triangle, at 45 deg.
+        step: how much higher the left lip lies than the right one [m]; depths count from the middle between them.
     """
 
     middle: float
@@ -38,166 +36,90 @@ class Section:
     floor: float
     lean: float
     blur: float
+    step: float = 0.0
+    taper: float = 0.5
 
-    def depth_at(self, x: Float[ndarray, "*k"], shear: Float[ndarray, "*k"]) -> Float[ndarray, "*k"]:
-        """Apparent depth [m] at x [m] where the sight line drifts `shear` to the left for each metre inward."""
-        left, right = self.middle + self.width / 2, self.middle - self.width / 2
-        centre = self.middle + self.lean - self.depth * shear
-        half = self.floor * self.width / 2
-        bottom_left, bottom_right = centre + half, centre - half
-        # A wall steeper than the sight line is hidden: its edge becomes a jump onto what lies behind it.
-        depth_left = np.where(bottom_left < left, self.depth, self.depth * _ratio(left - right, bottom_right - right))
-        depth_right = np.where(bottom_right > right, self.depth, self.depth * _ratio(left - right, left - bottom_left))
-        bl, br = np.minimum(bottom_left, left - EDGE), np.maximum(bottom_right, right + EDGE)
-        bl, br = np.maximum(bl, right + 2 * EDGE), np.minimum(br, left - 2 * EDGE)
-        bl = np.maximum(bl, br + EDGE)
-        dl, dr = np.minimum(depth_left, self.depth), np.minimum(depth_right, self.depth)
-        vertices = [(np.full_like(bl, left), 0.0 * bl), (bl, dl), (br, dr), (np.full_like(bl, right), 0.0 * bl)]
-        return _blurred(x, vertices, self.blur)
+    def image(self, x: Float[ndarray, "w"], shear: Float[ndarray, "m"]) -> tuple[Float[ndarray, "m w"], Float[ndarray, "m w"]]:
+        """Apparent depth [m] at x [m] for every shear, and how it changes as the section moves to the left.
 
-
-def _ratio(a: Float[ndarray, "*k"] | float, b: Float[ndarray, "*k"]) -> Float[ndarray, "*k"]:
-    return np.where(b > a, a / np.maximum(b, 1e-12), 1.0)
-
-
-def _blurred(x: Float[ndarray, "*k"], vertices: list[tuple[ndarray, ndarray]], blur: float) -> Float[ndarray, "*k"]:
-    """A polyline (vertices from left to right, 0 outside) averaged over two boxes, `blur` and half of it wide.
-
-    A polyline is a sum of ramps; a ramp averaged over two boxes is a second difference of cubic ramps.
-    """
-    wide = max(blur, 4e-4)
-    narrow = wide / 2
-    slopes = [(d1 - d0) / np.minimum(v1 - v0, -EDGE) for (v0, d0), (v1, d1) in pairwise(vertices)]
-    changes = [slopes[0], *(b - a for a, b in pairwise(slopes)), -slopes[-1]]
-    out = np.zeros(np.shape(x))
-    outer, inner = (wide + narrow) / 2, (wide - narrow) / 2
-    for (vertex, _), change in zip(vertices, changes, strict=True):
-        y = vertex - x  # ramps open to the right, where x is smaller
-        ramp = _cube(y + outer) - _cube(y + inner) - _cube(y - inner) + _cube(y - outer)
-        out = out - change * ramp / (wide * narrow)
-    return out
+        Args:
+            shear: (m,) how far the sight line drifts to the left for each metre inward.
+        """
+        low, high = float(shear.min()), float(shear.max())
+        levels = 1 if high - low < 1e-4 else LEVELS
+        table = np.linspace(low, high, levels)
+        v, d = vertices(np.array([[self.middle, self.width, self.depth, self.floor, self.lean, self.step]]), table)
+        slopes = turns(v, d)
+        ramp, ramp_slope, _, _ = ramps(v[..., None] - x, self.blur * footprint(table)[None], np.array([self.taper]))
+        depth = d[0, :, :1] + np.einsum("gj,gjw->gw", slopes[0], ramp[0])
+        change = np.einsum("gj,gjw->gw", slopes[0], ramp_slope[0])
+        if levels == 1:
+            return np.repeat(depth, len(shear), axis=0), np.repeat(change, len(shear), axis=0)
+        place = (shear - low) / (high - low) * (levels - 1)
+        whole = np.minimum(place.astype(int), levels - 2)
+        u = (place - whole)[:, None]
+        return depth[whole] * (1 - u) + depth[whole + 1] * u, change[whole] * (1 - u) + change[whole + 1] * u
 
 
-def _cube(y: Float[ndarray, "*k"]) -> Float[ndarray, "*k"]:
-    positive = np.maximum(y, 0.0)
-    return positive * positive * positive / 6.0
-
-
-NAMES = ("middle", "width", "depth", "floor", "lean", "blur")
-
-
-def fit_section(
-    x: Float[ndarray, "k"],
-    shear: Float[ndarray, "k"],
-    depth: Float[ndarray, "k"],
-    weight: Float[ndarray, "k"],
-    start: Section,
-    block: Int[ndarray, "k"],
-    noise: float,
-    *,
-    first: bool = False,
-) -> tuple[Section, float]:
-    """The section that fits depths measured at x, and its middle's standard deviation [m].
-
-    Robust weighted least squares. It is symmetric unless the data speak against that: `lean` and the lips' middle are
-    nearly exchangeable under blur and noise, so a lean is believed only where block after block asks for it
-    (`LEAN_SCORE`); where it is not, the deviation allows for an undetected one.
+def vertices(shape: Float[ndarray, "s 6"], shear: Float[ndarray, "g"]) -> tuple[Float[ndarray, "s g 4"], Float[ndarray, "s g 4"]]:
+    """Corners (x, depth) [m] of what is seen of each section under each shear, from the left lip to the right one.
 
     Args:
-        x, shear, depth, weight: (k,) cells of the strip; weight = how many independent looks each cell is worth.
-        start: initial values.  noise: standard deviation of one look [m].
-        block: (k,) which stretch of the seam each cell belongs to; noise is taken as independent between stretches.
-        first: `start` is a rough guess: begin from sharp, blurred, V and square sections, and keep the best. Blur can
-            stand in for a floor, so one start may end in the wrong one.
+        shape: (s, 6) middle, width, depth, floor, lean, step of each section.
     """
-    starts = [replace(start, blur=blur, floor=floor) for blur, floor in FIRST_STARTS] if first else [start]
-    plain, cost = min((_solve(x, shear, depth, weight, each, noise, symmetric=True) for each in starts), key=lambda found: found[1])
-    score, sigma, exchange = _lean_evidence(plain, x, shear, depth, weight, block)
-    leaning = [start] if start.lean else []
-    if abs(score) > LEAN_SCORE or (first and _misfit(plain, x, shear, depth, weight) > POOR_FIT):
-        width = max(start.width, plain.width)
-        leaning += [plain, *(replace(plain, lean=side * width, width=width, blur=4e-4, floor=0.1) for side in (0.35, -0.35))]
-    if leaning:
-        solved = (_solve(x, shear, depth, weight, each, noise, symmetric=False) for each in leaning)
-        best, lower = min(solved, key=lambda found: found[1])
-        if abs(score) > LEAN_SCORE or lower < LEAN_GAIN * cost:
-            _, sigma, exchange = _lean_evidence(best, x, shear, depth, weight, block)
-            return best, min(abs(exchange) * sigma, 0.1 * best.width)
-    allowed = LIKELY_LEAN * plain.width
-    return plain, abs(exchange) / float(np.hypot(1 / max(sigma, 1e-9), 1 / allowed))
+    middle, width, depth, floor, lean, step = (column[:, None] for column in shape.T)
+    left, right = middle + width / 2 + step / 2 * shear, middle - width / 2 - step / 2 * shear
+    half = np.maximum(floor * width, EDGE) / 2
+    centre = middle + lean - depth * shear
+    bl, br = centre + half, centre - half
+    # A wall steeper than the sight line is hidden: its edge becomes a jump onto what lies behind it.
+    to_right, to_left = np.maximum(br - right, EDGE), np.maximum(left - bl, EDGE)
+    span = left - right
+    dl = np.where(br > left, step / 2 + (depth - step / 2) * np.minimum(span / to_right, 1.0), depth)
+    dr = np.where(bl < right, -step / 2 + (depth + step / 2) * np.minimum(span / to_left, 1.0), depth)
+    bl = np.clip(bl, right + 2 * EDGE, left - EDGE)
+    br = np.clip(br, right + EDGE, left - 2 * EDGE)
+    bl = np.maximum(bl, br + EDGE)
+    level = np.zeros_like(bl)
+    return np.stack([left + 0 * bl, bl, br, right + 0 * bl], axis=-1), np.stack(
+        [level - step / 2, dl, dr, level + step / 2], axis=-1
+    )
 
 
-def _misfit(
-    section: Section, x: Float[ndarray, "k"], shear: Float[ndarray, "k"], depth: Float[ndarray, "k"], weight: Float[ndarray, "k"]
-) -> float:
-    """rms of what the section leaves over the rms of the depth."""
-    left = weight @ (section.depth_at(x, shear) - depth) ** 2
-    return float(np.sqrt(left / max(float(weight @ depth**2), 1e-30)))
+def turns(v: Float[ndarray, "*b 4"], d: Float[ndarray, "*b 4"]) -> Float[ndarray, "*b 4"]:
+    """Change of slope of a polyline at each vertex; it is level beyond its ends."""
+    slopes = np.diff(d, axis=-1) / np.maximum(v[..., :-1] - v[..., 1:], EDGE)
+    flat = np.zeros((*slopes.shape[:-1], 1))
+    return np.diff(np.concatenate([flat, slopes, flat], axis=-1), axis=-1)
 
 
-def _lean_evidence(
-    section: Section,
-    x: Float[ndarray, "k"],
-    shear: Float[ndarray, "k"],
-    depth: Float[ndarray, "k"],
-    weight: Float[ndarray, "k"],
-    block: Int[ndarray, "k"],
-) -> tuple[float, float, float]:
-    """How strongly the residuals ask for a lean: score, lean's deviation [m], shift of the middle for a unit of lean.
+def footprint(shear: Float[ndarray, "*k"]) -> Float[ndarray, "*k"]:
+    """How much wider a camera's window lies on the surface, across the groove, than on a surface that faces the camera.
 
-    The sensitivity to lean is made orthogonal to that of every other parameter; each block then votes, and the score is
-    the sum of the votes over their own scatter, so that correlated noise within a block cannot pass for evidence.
+    A window as wide as high in the image is stretched by 1 / cos(tilt) towards the tilt: across the groove by
+    sqrt(1 + shear^2).
     """
-    deltas = {"middle": 1e-4, "width": 1e-4, "depth": 1e-4, "floor": 0.02, "blur": 1e-4, "lean": 1e-4}
-    base = section.depth_at(x, shear)
-    columns = [(replace(section, **{name: getattr(section, name) + d}).depth_at(x, shear) - base) / d for name, d in deltas.items()]
-    others, lean = np.stack(columns[:-1], axis=1), columns[-1]
-    weighted = others * weight[:, None]
-    normal = others.T @ weighted
-    normal[np.diag_indices_from(normal)] *= 1 + 1e-9
-    shares = np.linalg.lstsq(normal, weighted.T @ lean, rcond=1e-12)[0]
-    free = lean - others @ shares
-    limit = 3 * max(float(np.median(np.abs(depth - base))) * 1.4826, 1e-6)
-    votes = np.bincount(block, weights=weight * free * np.clip(depth - base, -limit, limit))
-    votes = votes[np.bincount(block) > 0]
-    scatter = float(np.sqrt((votes**2).sum()))
-    strength = float((weight * free * free).sum())
-    if len(votes) < 4 or scatter <= 0 or strength <= 0:
-        return 0.0, float("inf"), float(-shares[0])
-    return float(votes.sum()) / scatter, scatter / strength, float(-shares[0])
+    return np.sqrt(1.0 + shear * shear)
 
 
-def _solve(
-    x: Float[ndarray, "k"],
-    shear: Float[ndarray, "k"],
-    depth: Float[ndarray, "k"],
-    weight: Float[ndarray, "k"],
-    start: Section,
-    noise: float,
-    *,
-    symmetric: bool,
-) -> tuple[Section, float]:
-    """The section of least cost, symmetric or not, and that cost."""
-    root = np.sqrt(weight) / max(noise, 1e-6)
-    scale = np.array([1e-3, 1e-3, 1e-3, 0.2, 1e-3, 1e-3])
-    prior = np.array([0.0, 0.0, 0.0, 0.25, 0.4 * start.width, 0.0])
-    first = np.array([getattr(start, name) for name in NAMES])
-    low = np.array([-0.02, 0.002, 1e-4, 0.0, -0.012, 0.0])
-    high = np.array([0.02, 0.045, 0.1, 0.95, 0.012, 0.015])
-    free = np.array([True, True, True, True, not symmetric, True])
-    if symmetric:
-        first[4] = 0.0
+def ramps(
+    y: Float[ndarray, "s g *k"], blur: Float[ndarray, "s g"], taper: Float[ndarray, "s"]
+) -> tuple[Float[ndarray, "s g *k"], Float[ndarray, "s g *k"], Float[ndarray, "s g *k"], Float[ndarray, "s g *k"]]:
+    """max(y, 0) averaged over two boxes, `blur` and `taper` times it wide; its slopes in y, in `blur` and in `taper`.
 
-    def residuals(theta: ndarray) -> ndarray:
-        full = first.copy()
-        full[free] = theta * scale[free]
-        section = Section(**dict(zip(NAMES, full.tolist(), strict=True)))
-        data = (section.depth_at(x, shear) - depth) * root
-        return np.concatenate([data, [(full[3]) / prior[3], full[4] / prior[4]]])
-
-    bounds = (low[free] / scale[free], high[free] / scale[free])
-    guess = np.clip(first[free] / scale[free], bounds[0] + 1e-6, bounds[1] - 1e-6)
-    solution = least_squares(residuals, guess, bounds=bounds, loss="soft_l1", f_scale=3.0, max_nfev=20, xtol=1e-4, ftol=1e-4)
-    full = first.copy()
-    full[free] = solution.x * scale[free]
-    return Section(**dict(zip(NAMES, full.tolist(), strict=True))), float(solution.cost)
+    A polyline is a sum of ramps, so this blurs it; a ramp averaged over two boxes is a second difference of cubes.
+    """
+    beside = [1] * (y.ndim - 2)
+    wide = np.maximum(blur, SHARPEST).reshape(*blur.shape, *beside)
+    share = np.maximum(taper, NARROWEST).reshape(-1, 1, *beside)
+    narrow = share * wide
+    outer, inner = (wide + narrow) / 2, (wide - narrow) / 2
+    a, b, c, d = (np.maximum(y + k, 0.0) for k in (outer, inner, -inner, -outer))
+    aa, bb, cc, dd = a * a, b * b, c * c, d * d
+    scale = 1 / (wide * narrow)
+    ramp = (a * aa - b * bb - c * cc + d * dd) * (scale / 6)
+    slope = (aa - bb - cc + dd) * (scale / 2)
+    over, under = (aa - dd) * (scale / 4), (bb - cc) * (scale / 4)
+    widening = over * (1 + share) - under * (1 - share) - 2 * ramp / wide
+    tapering = (over + under) * wide - ramp / share
+    return ramp, slope, widening, tapering

@@ -1,6 +1,6 @@
 """Where a groove is, station by station: matched against its section, then drawn smoothly."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -44,17 +44,16 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         flanked: (m,) stations with parent surface on both sides.  held: (m,) on one side at least: there a groove
             that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
     """
-    shear = np.repeat(grid.shear[:, None], len(grid.x), axis=1)
-    x = np.broadcast_to(grid.x, shear.shape)
-    model = section.depth_at(x, shear)
-    delta = 1e-4
-    slope = (section.depth_at(x - delta, shear) - section.depth_at(x + delta, shear)) / (2 * delta)
+    model, slope = section.image(grid.x, grid.shear)
     # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
     with np.errstate(invalid="ignore"):
         known = (grid.depth < deepest(section)) & (grid.depth > -0.004)
     # Inside the groove a stereo camera is about twice as noisy as on the plate.
     weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
-    depth = np.where(known, grid.depth, 0.0)
+    # Plates at two heights step where there is no groove too.
+    plates = replace(section, depth=0.0).image(grid.x, grid.shear)[0] if section.step else 0.0
+    model = model - plates
+    depth = np.where(known, grid.depth - plates, 0.0)
     terms = [slope * slope, model * model, slope * (depth - model), model * depth]
     each = np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)
     least = round(LATERAL_REACH * grid.sparsity)
@@ -70,7 +69,9 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
-    return Track(shift, weights, amplitude, local, _misfit(np.where(known, depth - model, 0.0), depth, known, seen))
+    return Track(
+        section.middle + shift, weights, amplitude, local, _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
+    )
 
 
 def deepest(section: Section) -> float:

@@ -1,0 +1,187 @@
+"""The cross-section of a groove with what is known of its lean: estimated where the data tell, doubted where not.
+
+Under blur and noise a lean is nearly exchangeable with the lips' middle. So the section is fitted for each of a range
+of leans, and the middle is averaged over them, each as likely as it fits: its scatter is the doubt.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from weldsim.seam.profile.section import Section
+from weldsim.seam.profile.shape import HIGH, LEAN, LOW, UNIT, Solution, predict, section_of, solve, terms, unknowns
+from weldsim.seam.profile.views import Blocks, Views, gather
+
+LEANS = (-1.0, -0.7, -0.4, -0.15, 0.15, 0.4, 0.7, 1.0)  # of the most that leaves no wall overhanging
+FIRST_LEANS = (0.0, -0.8, 0.8)
+FEW_LEANS = (0.0, -0.6, 0.6)  # looked at first
+WORTH_A_LOOK = 2.0  # log likelihood ratio of the best lean there from which all are looked at
+LEAN_SCORE = 4.5  # standard deviations by which a lean must stand out: most grooves are symmetric
+FIRST_STARTS = ((4e-4, 0.1), (5e-3, 0.1), (4e-4, 0.7), (8e-3, 0.3))  # blur [m], floor: one may stand in for the other
+SYMMETRIC_ODDS = 5.0  # how much likelier a groove is symmetric than leaning, for the doubt: it weighs leans that go unseen
+UNNOTICED = 0.02  # of the width: the lean of a groove that counts as symmetric
+BIN = 0.0035  # [m] across the seam, over which what no section can fit is alike
+MOST_DOUBT = 0.15  # of the width
+
+
+def follow_section(blocks: Blocks, start: Section, noise: float) -> Section:
+    """The section that fits blocks of a strip, begun at `start` and with its lean.
+
+    Args:
+        noise: the least standard deviation of a cell [m].
+    """
+    views = gather(blocks, start.depth, noise)
+    return section_of(solve(unknowns(start)[None], _all_but_lean(), views, blocks.x, start.step)[0].theta, start.step)
+
+
+def first_section(blocks: Blocks, start: Section, noise: float) -> Section:
+    """The section that fits blocks of a strip, begun at sharp, blurred, V, square and leaning ones of `start`'s size."""
+    views, base = gather(blocks, start.depth, noise), unknowns(start)
+    starts = [_leaning(base, lean, *other) for lean in FIRST_LEANS for other in FIRST_STARTS]
+    rough = _calm(np.array(starts), views, blocks, start.step)
+    found = solve(_picked(rough, len(FIRST_STARTS), 2), _all_but_lean(), views, blocks.x, start.step)
+    symmetric, leaning = (min(part, key=lambda each: each.cost) for part in (found[:2], found[2:]))
+    free = solve(leaning.theta[None], np.ones(7, bool), views, blocks.x, start.step)[0]
+    insists = _gain(symmetric, free, views, blocks, start.step) > LEAN_SCORE**2 / 2
+    return section_of((free if insists else symmetric).theta, start.step)
+
+
+def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Section, float]:
+    """The section that fits blocks of a strip, near `start` but for its lean, and its middle's standard deviation [m]."""
+    views = gather(blocks, start.depth, noise)
+    found, insists = _over_leans(unknowns(start), views, blocks, start.step)
+    lean = np.array([each.theta[LEAN] for each in found])
+    middle = np.array([each.theta[0] for each in found])
+    mass = _likelihood(found, lean, views, blocks, start.step)
+    chosen = float(mass @ lean) if insists else 0.0
+    theta = found[int(np.argmin(np.abs(lean - chosen)))].theta.copy()
+    theta[LEAN] = chosen
+    last = solve(theta[None], _all_but_lean(), views, blocks.x, start.step)[0]
+    between = float(mass @ (middle - last.theta[0]) ** 2)
+    exchange = abs(float(np.polyfit(lean, middle, 1)[0]))
+    unnoticed = float(mass[lean == 0.0].sum()) * (2 * UNNOTICED * exchange) ** 2
+    variance = between + unnoticed + _variance(last, views, blocks, start.step)
+    return section_of(last.theta, start.step), float(min(np.sqrt(variance), MOST_DOUBT * last.theta[1]))
+
+
+def _all_but_lean() -> Bool[ndarray, "7"]:
+    free = np.ones(7, bool)
+    free[LEAN] = False
+    return free
+
+
+def _leaning(base: Float[ndarray, "7"], lean: float, blur: float, floor: float) -> Float[ndarray, "7"]:
+    """A start with another lean: the lips go the other way by a third of the bottom's shift, as the centroid stays."""
+    theta = base.copy()
+    theta[0] += (base[LEAN] - lean) * base[1] / 6
+    theta[3:6] = floor, lean, blur
+    return theta
+
+
+def _calm(starts: Float[ndarray, "s 7"], views: Views, blocks: Blocks, step: float) -> list[Solution]:
+    """Solutions with cells taken as independent: what hangs together makes the cost rugged far from its minimum."""
+    plain = replace(views, weight=views.weight * 0.1, white=np.eye(len(blocks.x)))
+    return solve(starts, _all_but_lean(), plain, blocks.x, step, most=10)
+
+
+def _picked(found: list[Solution], group: int, best: int) -> Float[ndarray, "s 7"]:
+    """The best few solutions of every group."""
+    groups = [sorted(found[k : k + group], key=lambda each: each.cost)[:best] for k in range(0, len(found), group)]
+    return np.array([each.theta for some in groups for each in some])
+
+
+def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: float) -> tuple[list[Solution], bool]:
+    """The best section for each of a few leans, or of LEANS where a lean may be better, and the best of all.
+
+    And whether the data insist on a lean.
+    """
+    found = _at_leans(base, FEW_LEANS, views, blocks, step)
+    symmetric = found[0]
+    free = _freed(found, views, blocks, step)
+    gain = _gain(symmetric, free, views, blocks, step)
+    if gain > WORTH_A_LOOK:
+        found = [symmetric, *_at_leans(base, LEANS, views, blocks, step)]
+        free = _freed([min([*found, free], key=lambda each: each.cost)], views, blocks, step)
+        gain = _gain(symmetric, free, views, blocks, step)
+    if abs(free.theta[LEAN]) > 1e-3:
+        found.append(free)
+    return found, gain > LEAN_SCORE**2 / 2
+
+
+def _freed(found: list[Solution], views: Views, blocks: Blocks, step: float) -> Solution:
+    """The best section of any lean near one of some solutions."""
+    near = np.stack([found[0].theta, *(each.theta for each in found)])
+    near[:2, LEAN] += (0.08, -0.08)
+    return min(solve(near, np.ones(7, bool), views, blocks.x, step), key=lambda each: each.cost)
+
+
+def _at_leans(base: Float[ndarray, "7"], leans: tuple[float, ...], views: Views, blocks: Blocks, step: float) -> list[Solution]:
+    """The best section for each of some leans."""
+    others = ((base[5], base[3]), (max(base[5] - 0.003, 4e-4), 0.1), (base[5] + 0.002, 0.3))
+    starts = [_leaning(base, lean, *other) for lean in leans for other in others]
+    return solve(_picked(_calm(np.array(starts), views, blocks, step), len(others), 1), _all_but_lean(), views, blocks.x, step)
+
+
+def _gain(symmetric: Solution, free: Solution, views: Views, blocks: Blocks, step: float) -> float:
+    """Log likelihood ratio of a leaning solution to the symmetric one, no better known than the data's scatter allows."""
+    return (symmetric.cost - free.cost) / max(1.0, _excess(symmetric, free, views, blocks, step))
+
+
+def _likelihood(found: list[Solution], lean: Float[ndarray, "s"], views: Views, blocks: Blocks, step: float) -> Float[ndarray, "s"]:
+    """How likely each solution is: a symmetric groove, or one of any lean alike, before; as well as it fits, after."""
+    best = min(found, key=lambda each: each.cost)
+    worse = np.array([(e.cost - best.cost) / max(1.0, _excess(e, best, views, blocks, step)) for e in found])
+    order = np.argsort(lean)
+    between = 0.5 * (lean[order][1:] + lean[order][:-1])
+    span = np.empty(len(lean))
+    span[order] = np.diff(np.concatenate([[-1.0], between, [1.0]]))
+    for k in range(len(lean)):  # a peak may be narrower than the leans are apart
+        apart = np.abs(np.delete(lean, k) - lean[k])
+        rise = np.sqrt(2 * np.maximum(np.delete(worse, k) - worse[k], 0.0) + 1e-12) / np.maximum(apart, 1e-3)
+        span[k] = min(span[k], 2.5 / float(rise[np.argsort(apart)[:2]].min()))
+    prior = np.where(lean == 0.0, SYMMETRIC_ODDS, span / 2)
+    mass = prior * np.exp(-worse)
+    return mass / mass.sum()
+
+
+def _scores(pull: Float[ndarray, "p g w"], depth: Float[ndarray, "g w"], views: Views, blocks: Blocks) -> Float[ndarray, "p b n"]:
+    """What each block's cells in each bin across the seam add to the whitened products of `pull` with the residual."""
+    root = np.sqrt(views.weight)
+    reach = ((pull * root) @ (views.white.T @ views.white)) / np.maximum(root, 1e-12)
+    residual = np.where(views.each > 0, depth[views.of] - blocks.depth, 0.0)
+    score = reach[:, views.of] * (views.each * residual)
+    number = np.floor(blocks.x / BIN).astype(int)
+    return np.stack([score[:, :, number == k].sum(axis=2) for k in np.unique(number)], axis=2)
+
+
+def _excess(one: Solution, best: Solution, views: Views, blocks: Blocks, step: float) -> float:
+    """Variance of the data's vote between two solutions, over what the noise's correlation lets one expect.
+
+    From block to block along the seam and from bin to bin across it: clusters both ways (Cameron, Gelbach and Miller 2011).
+    """
+    if one is best:
+        return 1.0
+    depth, _ = predict(np.stack([one.theta, best.theta]), step, blocks.x, views.shear)
+    apart = ((depth[1] - depth[0]) * np.sqrt(views.weight)) @ views.white.T
+    votes = _scores((depth[1] - depth[0])[None], depth[1], views, blocks)[0]
+    n = len(votes)
+    along = float((votes.sum(axis=1) ** 2).sum()) * n / max(n - 5, 0.4 * n)
+    across = float((votes.sum(axis=0) ** 2).sum()) - float((votes**2).sum())
+    return (along + max(across, 0.0)) / max(float((apart**2).sum()), 1e-12)
+
+
+def _variance(found: Solution, views: Views, blocks: Blocks, step: float) -> float:
+    """Variance of a solution's middle [m^2] at its lean, from the scatter of its scores, clustered as in `_excess`."""
+    depth, jacobian = predict(found.theta[None], step, blocks.x, views.shear)
+    free = found.free & (found.theta > LOW) & (found.theta < HIGH)
+    free[:3] = True
+    slopes = terms(found.theta[None], views, blocks.x, step)[1][0][free]
+    inverse = np.linalg.pinv(slopes @ slopes.T + 1e-9 * np.eye(len(slopes)), rcond=1e-10, hermitian=True)
+    score = np.einsum("p,pbn->bn", inverse[0], _scores(jacobian[0][free], depth[0], views, blocks))
+    n, p = len(score), len(slopes)
+    along = float((score.sum(axis=1) ** 2).sum()) * n / max(n - p, 0.4 * n)
+    bins = score.shape[1]
+    across = float((score.sum(axis=0) ** 2).sum()) * bins / max(bins - p, 0.4 * bins) - float((score**2).sum())
+    return (along + max(across, 0.0)) * UNIT[0] ** 2

@@ -1,0 +1,119 @@
+"""A groove's mean sections, one for each direction of sight, and how their noise hangs together."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+SAME_VIEW = 2e-4  # [m] blocks whose bottoms the sight line displaces alike within this are averaged
+MOST_VIEWS = 5
+FEWEST_BLOCKS = 4  # in a view: a median of fewer is no robust one
+REACHES = (0.001, 0.002, 0.003, 0.004, 0.0055, 0.0075)  # [m] correlation lengths tried for the noise
+SHARPNESS = 2.0  # with which a worse correlation length counts less
+USUAL_REACH = 0.0035  # [m] where there is too little to tell
+WHITE = 0.2  # of the noise's variance, at least, is taken as independent from cell to cell: cells are no exact means
+PARENT = 0.4  # error of the parent surface, level and tilt, over the noise of a cell
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Cells of a strip averaged over blocks of stations.
+
+    Attributes:
+        x: (w,) [m].  depth: (b, w) apparent [m].  number: (b, w) stations with data in each cell, of `full`; 0 = empty.
+        shear: (b,) how far the sight line drifts to the left for each metre inward.
+    """
+
+    x: Float[ndarray, "w"]
+    depth: Float[ndarray, "b w"]
+    number: Float[ndarray, "b w"]
+    shear: Float[ndarray, "b"]
+    full: int
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Blocks gathered into a few mean sections.
+
+    Attributes:
+        shear: (g,).  depth, weight: (g, w) robust mean [m] and inverse variance [1/m^2], 0 where empty.
+        of: (b,) view of each block.  each: (b, w) the part of each cell in that weight.
+        white: (w, w) maps cells over their deviation to numbers of unit variance that hang together no more.
+    """
+
+    shear: Float[ndarray, "g"]
+    depth: Float[ndarray, "g w"]
+    weight: Float[ndarray, "g w"]
+    of: Int[ndarray, "b"]
+    each: Float[ndarray, "b w"]
+    white: Float[ndarray, "w w"]
+
+
+def gather(blocks: Blocks, depth: float, noise: float) -> Views:
+    """The robust mean section for each direction of sight.
+
+    Args:
+        depth: of the groove, roughly [m].  noise: the least standard deviation of a cell [m].
+    """
+    count = len(blocks.shear)
+    spread = float(np.ptp(blocks.shear))
+    groups = int(np.clip(np.ceil(spread * depth / SAME_VIEW), 1, min(MOST_VIEWS, max(count // FEWEST_BLOCKS, 1))))
+    of = np.empty(count, np.int64)
+    of[np.argsort(blocks.shear, kind="stable")] = np.arange(count) * groups // count
+    # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
+    known = (blocks.number > 0) & (blocks.depth < 1.5 * depth + 0.003) & (blocks.depth > -0.004)
+    seen = np.where(known, blocks.depth, np.nan)
+    middle = np.stack([_median(seen[of == g]) for g in range(groups)])
+    off = np.nan_to_num(seen - middle[of])
+    deviation = _deviation(np.where(known, np.abs(off), np.nan), noise)
+    tame = 1 / np.maximum(np.abs(off) / (2.5 * deviation), 1.0)
+    each = known * blocks.number / blocks.full * tame / deviation**2
+    weight, total = np.zeros_like(middle), np.zeros_like(middle)
+    np.add.at(weight, of, each)
+    np.add.at(total, of, each * np.nan_to_num(seen))
+    shear = np.bincount(of, weights=blocks.shear) / np.bincount(of)
+    white = np.linalg.inv(np.linalg.cholesky(_correlation(off * tame / deviation, known, blocks.x)))
+    return Views(shear, total / np.maximum(weight, 1e-30), weight, of, each, white)
+
+
+def _median(values: Float[ndarray, "b w"]) -> Float[ndarray, "w"]:
+    """Median of the known values of each column; NaN where there is none."""
+    order = np.sort(values, axis=0)
+    last = np.maximum(np.isfinite(values).sum(axis=0) - 1, 0)
+    column = np.arange(values.shape[1])
+    return 0.5 * (order[last // 2, column] + order[(last + 1) // 2, column])
+
+
+def _deviation(off: Float[ndarray, "b w"], noise: float) -> Float[ndarray, "w"]:
+    """Standard deviation of a cell [m] in each column, robust, evened out over 3.5 mm."""
+    spread = 1.4826 * _median(off)
+    spread = np.where(np.isfinite(spread), spread, noise)
+    return np.maximum(np.convolve(np.pad(spread, 3, mode="edge"), np.ones(7) / 7, mode="valid"), noise)
+
+
+def _correlation(off: Float[ndarray, "b w"], known: Bool[ndarray, "b w"], x: Float[ndarray, "w"]) -> Float[ndarray, "w w"]:
+    """Covariance of cells across the seam, over their variances: of the noise, as seen, and of the parent surface.
+
+    The noise is part white, part with correlation exp(-(distance / length)^2).
+    """
+    w = len(x)
+    lags = np.arange(1, min(24, w // 2))
+    pairs = np.array([max(np.count_nonzero(known[:, :-k] & known[:, k:]), 1) for k in lags])
+    seen = np.array([(off[:, :-k] * off[:, k:]).sum() for k in lags]) / pairs
+    power = (off * off).sum() / max(np.count_nonzero(known), 1)
+    apart = (x[:, None] - x[None, :]) ** 2
+    reaches, shares, chance = np.array([USUAL_REACH]), np.array([1 - WHITE]), np.ones(1)
+    if len(off) >= 4 and power > 0:
+        reaches = np.array(REACHES)
+        shapes = np.exp(-((lags[None] * (x[1] - x[0]) / reaches[:, None]) ** 2))
+        shares = np.clip(shapes @ (seen / power) / (shapes * shapes).sum(axis=1), 0.0, 1 - WHITE)
+        misfit = ((seen / power - shares[:, None] * shapes) ** 2).sum(axis=1)
+        # Lengths that fit alike count alike: a choice between them would make the section jump.
+        chance = np.exp(-SHARPNESS * (misfit / max(float(misfit.min()), 1e-12) - 1))
+        chance /= chance.sum()
+    noise = np.zeros((w, w))
+    for reach, share, part in zip(reaches.tolist(), shares.tolist(), chance.tolist(), strict=True):
+        noise += part * (share * np.exp(-apart / reach**2) + (1 - share) * np.eye(w))
+    tilt = x / np.abs(x).max()
+    return noise + PARENT**2 * (1 + np.outer(tilt, tilt))
