@@ -17,6 +17,8 @@ from weldsim.errors import InputError, SensorError
 if TYPE_CHECKING:
     from weldsim.dryrun.cell import Cell
     from weldsim.dryrun.verdict import DryRun, Trial, Verdict
+    from weldsim.motion.config import MotionConfig
+    from weldsim.records import TorchPath
 
 TOLD = 12  # failures in full
 
@@ -61,13 +63,21 @@ class DryRunCommand(ConfigOptions):
     png: Path | None = None
     """Where to write the picture of the first failure."""
 
+    reach_map: Path | None = None
+    """Where to write a picture of the table: where the part could stand so that the whole seam can be welded (first seam)."""
+
+    export: Path | None = None
+    """Where to write the planned motion as URScript; only where the dry run passes."""
+
     def __call__(self) -> int:
         """0 where the job would pass, else 1."""
         refuse_together(scene=self.scene, empty=self.empty or None)
         check_suffix(self.html, (".html",), "a page")
         check_suffix(self.png, (".png",), "a picture")
         check_suffix(self.out, (".json",), "a dry run")
-        check_outputs((self.html, self.out, self.png), (self.config, self.file))
+        check_suffix(self.reach_map, (".png",), "a reach map")
+        check_suffix(self.export, (".script", ".urscript"), "a program")
+        check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file))
         config, q_start = self.cell(), None if self.start is None else joint_angles(self.start)
 
         from weldsim.dryrun.read import read_program
@@ -76,16 +86,24 @@ class DryRunCommand(ConfigOptions):
         program = read_program(
             self.file, tool=self.tool, base=self.base, speed=config.path.speed, roll_free=True if self.roll else None
         )
+        if program.kind == "script" and (self.reach_map is not None or self.export is not None):
+            raise InputError(f"{self.file}: --reach-map and --export are for paths; this is a robot program already")
         if self.html is not None or self.png is not None:
             choose_platform()
         with progress() as tell:
             cell = self._cell(q_start)
             result = dry_run(program, cell, config.motion, fix=not self.no_fix, tell=tell)
             written, trouble = self._write(result, cell)
+            extra: dict[str, Any] = {}
+            if self.reach_map is not None:
+                extra = {"reach_map": self._map(program.paths[0], cell, config.motion, lambda done: tell("reach map", done))}
+                written.append(self.reach_map)
+            if self.export is not None and result.passed:
+                written.append(self._export(result, config.motion))
         if self.json:
             from weldsim.dryrun.verdict import dry_run_json
 
-            print_json({**dry_run_json(result), "written": [str(path) for path in written]})
+            print_json({**dry_run_json(result), **extra, "written": [str(path) for path in written]})
         else:
             self._print(result, written, trouble)
         return 0 if result.passed else 1
@@ -122,6 +140,33 @@ class DryRunCommand(ConfigOptions):
         if self.out is not None:
             written.append(write_whole(self.out, json.dumps(dry_run_json(result), indent=1, allow_nan=False) + "\n"))
         return written, trouble
+
+    def _map(self, path: "TorchPath", cell: "Cell", config: "MotionConfig", tell: Any) -> dict[str, Any]:
+        """The reach map, drawn; as JSON."""
+        from weldsim.dryrun.reach import reach_json, reach_map, reach_picture
+        from weldsim.output import write_whole
+
+        found = reach_map(path, cell, config, tell=tell)
+        write_whole(self.reach_map, reach_picture(found, self.file.stem))  # type: ignore[arg-type] - asked for
+        return reach_json(found)
+
+    def _export(self, result: "DryRun", config: "MotionConfig") -> Path:
+        """All welds one after the other, each from the start and back to it."""
+        from weldsim.execution.urscript import script_text
+        from weldsim.output import write_whole
+
+        parts = [
+            script_text(
+                trial.trajectory,
+                title=f"{result.source}, {trial.name}",
+                joint_speed=config.joint_speed,
+                joint_acceleration=config.joint_acceleration,
+                lead_speed=config.lead_speed,
+            )
+            for trial in result.trials
+            if trial.trajectory is not None
+        ]
+        return write_whole(self.export, "\n".join(parts))  # type: ignore[arg-type] - asked for
 
     def _picture(self, trial: "Trial", cell: "Cell") -> bytes:
         from weldsim.dryrun.picture import picture

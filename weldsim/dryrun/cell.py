@@ -39,6 +39,16 @@ class Cell:
         model.body_pos[body] = self.model.body_pos[body] + X_WB.R @ move
         return Cell(name=self.name, model=model, collision=CellCollision(model), q_start=self.q_start, has_part=True)
 
+    def without(self, body: str) -> "Cell":
+        """A cell in which every collision body whose name begins with `body` has been taken away."""
+        import copy
+
+        model = copy.copy(self.model)
+        for geom in range(model.ngeom):
+            if model.geom(geom).name.startswith(body):
+                model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
+        return Cell(name=self.name, model=model, collision=CellCollision(model), q_start=self.q_start, has_part=self.has_part)
+
 
 def scene_cell(scene: "SceneConfig", q_start: Float[ndarray, "6"] | None = None) -> Cell:
     """The scene, the arm where its last view holds the camera unless said otherwise.

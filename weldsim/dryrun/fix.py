@@ -20,6 +20,8 @@ from weldsim.motion.rungs import turned
 from weldsim.records import TorchPath
 
 TURNS = np.deg2rad([s * a for a in (5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 105, 120, 135, 150, 165, 180) for s in (1, -1)])
+LEANS = np.deg2rad([5.0, 10.0, 15.0, 20.0, 30.0])
+LOOSE = "clamp"  # names of what can be taken away begin so
 DISTANCES = (0.01, 0.02, 0.03, 0.05, 0.075, 0.10, 0.15, 0.20, 0.25, 0.30, 0.40, 0.50)  # [m] the part is moved by, tried in order
 HEADINGS = 12  # directions on the table
 CLOSE = 0.005  # [m] to which the nearest place that does is found
@@ -41,7 +43,12 @@ def fixes_for_path(
     found = []
     if not path.roll_free:
         found += _turn(path, trial, cell, config)
-    found += _move(path, trial, cell, config, tell)
+    if failure.why == "collision":
+        found += _taken_away(path, trial, cell, config)
+    found += _lean(path, trial, cell, config)
+    # A part that is moved takes with it what stands in the way.
+    if failure.why != "collision" or not found:
+        found += _move(path, trial, cell, config, tell)
     found += _cut(path, trial, cell, config)
     return tuple(found)
 
@@ -68,6 +75,45 @@ def _turn(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
         if (tries := tries + 1) >= FULL_TRIES:
             break
     return []
+
+
+def _taken_away(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
+    """Without the clamps that are touched, one after the other, where that is all that stands in the way."""
+    away: list[str] = []
+    for _ in range(FULL_TRIES):
+        failure = trial.failure
+        clamp = next((c for c in (failure.first, failure.second) if c.startswith(LOOSE)), "") if failure is not None else ""
+        if failure is None or not clamp:
+            break
+        away.append(clamp)
+        cell = cell.without(clamp)
+        trial = try_path(path, trial.name, cell, config)
+    if not away or not trial.passed:
+        return []
+    return [Fix(kind="take away", text=f"take {' and '.join(away)} out of the torch's way", body=", ".join(away))]
+
+
+def _lean(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
+    tries = 0
+    for angle in LEANS:
+        for lean in ((angle, 0.0), (-angle, 0.0), (0.0, angle), (0.0, -angle)):
+            changed = _with(path, X_BT=leaned(path.X_BT, *lean))
+            if not _quick(changed, cell, config):
+                continue
+            if try_path(changed, trial.name, cell, config).passed:
+                which = "work" if lean[0] else "travel"
+                text = f"add {np.rad2deg(lean[0] + lean[1]):+.0f} deg of {which} angle"
+                return [Fix(kind="lean the torch", text=text, lean=(float(lean[0]), float(lean[1])))]
+            if (tries := tries + 1) >= FULL_TRIES:
+                return []
+    return []
+
+
+def leaned(X_BT: Transform, work: float, travel: float) -> Transform:
+    """The poses leaned about their own tips: right-handed about travel, and pushing for a positive travel angle [rad]."""
+    turn = Transform.from_rotation_vector("TT", np.array([work, 0.0, 0.0]), np.zeros(3))
+    turn = turn @ Transform.from_rotation_vector("TT", np.array([0.0, travel, 0.0]), np.zeros(3))
+    return Transform("BT", X_BT.R @ turn.R, X_BT.p)
 
 
 def _move(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell: Progress) -> list[Fix]:

@@ -21,6 +21,7 @@ from weldsim.records import TorchPath
 FINE = 0.001  # [m] to which the first place that fails is found
 FASTEST = 0.25  # [m/s] greatest torch speed with the arc, the safety limit of manual mode
 JUMP = np.deg2rad(2.0)  # [rad] two poses may always differ by so much
+COARSE_ROLLS = 18  # rotations about the wire of a coarse look
 SLOW = 0.99  # share of the asked speed below which a weld is not what was asked for
 
 
@@ -169,6 +170,7 @@ def _planned(base: Trial, path: TorchPath, plan: MotionPlan, config: MotionConfi
         cycle=float(trajectory.t[-1]),
         notes=plan.notes,
         slowest=plan.slowest,
+        trajectory=trajectory,
     )
     if plan.slowest >= SLOW:
         return out
@@ -185,6 +187,13 @@ def quick(path: TorchPath, cell: Cell, config: MotionConfig, length: float = 0.0
     """Whether a coarse look finds a sweep of the arm along the path: a sieve for many places, not a verdict."""
     from weldsim.motion.ladder import climb
 
+    def blocked(q: Float[ndarray, "6"]) -> str | None:
+        return "something" if cell.collision.touches(q) else None
+
     rail = make_rail(path, config)
-    rungs = make_rungs(rail, X_FT, replace(config, rolls=min(config.rolls, 24)), cell.collision, at=places(rail, length, turn))
+    # Its ends first: most places that will not do fail there.
+    coarse = replace(config, rolls=min(config.rolls, COARSE_ROLLS))
+    if make_rungs(rail, X_FT, coarse, blocked, at=rail.s[[0, -1]]).first_refused is not None:
+        return False
+    rungs = make_rungs(rail, X_FT, coarse, blocked, at=places(rail, length, turn))
     return rungs.first_refused is None and climb(rungs, cell.q_start, X_FT, config) is not None

@@ -30,7 +30,7 @@ MOVING = (
     "conveyor",
 )
 BLOCKS = ("while", "for", "if", "elif", "else", "thread", "switch", "loop")
-SILENT = ("def", "end", "sec")
+SILENT = ("def", "end", "sec", "stopj", "stopl")  # what moves is at rest already
 FURTHEST = 3.0  # [m]
 _CALL = re.compile(r"^(\w+)\s*\((.*)\)$", re.DOTALL)
 _ASSIGN = re.compile(r"^(?:global\s+|local\s+)?(\w+)\s*=\s*([^=].*)$", re.DOTALL)
@@ -94,6 +94,7 @@ class _Reader:
         """One statement."""
         word = re.split(r"\W", line, maxsplit=1)[0]
         if word in SILENT:
+            self.ignored |= set(re.findall(r"^def\s+(\w+)", line))
             return
         if word in BLOCKS:
             raise self.wrong(number, f"{word}: which motions follow cannot be told beforehand; give a program without control flow")

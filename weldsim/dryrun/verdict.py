@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.records import JointTrajectory
+
 Why = Literal[
     "ok",
     "unreachable",
@@ -51,11 +53,14 @@ class Fix:
 
     Attributes:
         kind: what is changed.  text: the change in words.
+        lean: added work angle and travel angle [rad].  body: what is taken away.
         turn: about the wire [rad].  move: of the part, in the base [m].  speed: of the weld [m/s].  cut: arc lengths [m].
     """
 
-    kind: Literal["turn about the wire", "move the part", "slower", "cut the weld"]
+    kind: Literal["turn about the wire", "lean the torch", "take away", "move the part", "slower", "cut the weld"]
     text: str
+    lean: tuple[float, float] = (0.0, 0.0)
+    body: str = ""
     turn: float = 0.0
     move: tuple[float, float, float] = (0.0, 0.0, 0.0)
     speed: float = 0.0
@@ -72,6 +77,7 @@ class Trial:
         arc_on: when the arc burns.  cycle: time it takes [s], 0 where it cannot be done.
         q_worst: joint angles at the first failure, to be drawn; None where no posture gets there.  p_worst: its place in B [m].
         points_B: the tip's way, to be drawn.  notes: what else is worth knowing.  length: of the tip's way [m].
+        trajectory: the planned motion in full, None where there is none or the program is the robot's own.
         split: where cutting the weld would help [m].  slowest: least ratio of possible to asked speed, 0 where it is not known.
     """
 
@@ -86,6 +92,7 @@ class Trial:
     points_B: Float[ndarray, "n 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     notes: tuple[str, ...] = ()
     length: float = 0.0
+    trajectory: JointTrajectory | None = None
     split: tuple[float, ...] = ()
     slowest: float = 0.0
 
@@ -155,7 +162,16 @@ def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
         ],
         "first_failure": None if failure is None else {"index": failure.index, "s": failure.s, **_verdict_json(failure)},
         "fixes": [
-            {"kind": fix.kind, "text": fix.text, "turn": fix.turn, "move": list(fix.move), "speed": fix.speed, "cut": list(fix.cut)}
+            {
+                "kind": fix.kind,
+                "text": fix.text,
+                "turn": fix.turn,
+                "lean": list(fix.lean),
+                "body": fix.body,
+                "move": list(fix.move),
+                "speed": fix.speed,
+                "cut": list(fix.cut),
+            }
             for fix in fixes
         ],
         "notes": list(trial.notes),

@@ -68,6 +68,14 @@ class CellCollision:
         first, second = (self._model.geom(int(g)).name.removesuffix("_collision") or f"geom {g}" for g in pairs[deepest])
         return Touch(first=first, second=second, depth=-float(distance[deepest]))
 
+    def touches(self, q: Float[ndarray, "6"]) -> bool:
+        """Whether the arm touches anything at q [rad]."""
+        data = self._data
+        data.qpos[self._qpos] = q
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        return data.ncon > 0 and bool((self._arm[data.contact.geom].any(axis=1) & (data.contact.dist < 0)).any())
+
     def gap(self, q: Float[ndarray, "6"]) -> float:
         """Distance [m] of the arm at q [rad] from the nearest other body or far link, negative in contact, NEAR at most."""
         data = self._wide_data

@@ -16,6 +16,7 @@ RANGES = {
     "joint_jerk": (1e-2, 1e5),
     "joint_speed_limit": (1e-3, 100.0),
     "joint_acceleration_limit": (1e-3, 1e4),
+    "joint_jerk_limit": (1e-1, 1e6),
     "limit_margin": (0.0, 3.0),
     "grid": (5e-5, 0.1),
     "spline_tolerance": (1e-8, 0.01),
@@ -53,6 +54,9 @@ class MotionConfig:
     """Joint speed that no sample may exceed (published limit 180 deg/s): a weld slows down before it is reached."""
     joint_acceleration_limit: float = 10.0
     """Joint acceleration that no sample may exceed [rad/s2]: a weld slows down before it is reached."""
+    joint_jerk_limit: float = 350.0
+    """Joint jerk that no sample may exceed [rad/s3]: ramps are softened and a weld slows down before it is reached. The maker
+    publishes none; in logs of a real UR5 the targets of its own controller reach 357."""
     limit_margin: Radian = 0.1
     """Distance kept from each joint's end stop."""
     grid: Metre = 0.002

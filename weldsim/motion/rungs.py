@@ -158,8 +158,8 @@ def _judged(
 def _touch(q: Float[ndarray, "6"], blocked: Blocked) -> tuple[Touch | None, float]:
     """What q touches, or None; and the gap to the nearest body [m]."""
     if isinstance(blocked, CellCollision):
-        gap = blocked.gap(q)
-        return blocked.touch(q), gap
+        touch = blocked.touch(q)
+        return touch, blocked.gap(q) if touch is None else 0.0
     text = blocked(q)
     return (None if text is None else Touch(first=text, second="", depth=0.0)), NEAR
 

@@ -17,6 +17,7 @@ from weldsim.motion.rail import Rail
 from weldsim.records import Segment
 
 BLOCK = 0.005  # [m] a weld slows down over whole blocks of this length
+RAMPING, BENDING, TWISTING = 0.35, 0.20, 0.45  # shares of a joint's jerk: of ramps, of ramps on bends, of changing bends
 HEADROOM = 0.97  # of a joint limit, so that the ramps between blocks stay inside it
 
 
@@ -64,7 +65,7 @@ def air_move(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config:
     request.current_position, request.target_position = list(map(float, q0)), list(map(float, q1))
     request.max_velocity = [min(config.joint_speed, config.joint_speed_limit)] * 6
     request.max_acceleration = [min(config.joint_acceleration, config.joint_acceleration_limit)] * 6
-    request.max_jerk = [config.joint_jerk] * 6
+    request.max_jerk = [min(config.joint_jerk, config.joint_jerk_limit)] * 6
     request.synchronization = ruckig.Synchronization.Phase
     trajectory = _solve(ruckig.Ruckig(6), request, 6, "air move")
     n = int(np.ceil(trajectory.duration / config.period - 1e-9)) + 1
@@ -89,7 +90,9 @@ def piece_move(rail: Rail, path: JointPath, config: MotionConfig) -> Move:
     # Half the joints' acceleration is for ramps of the tip's speed, the rest for bends of the joint path.
     ramp = 0.5 * HEADROOM * config.joint_acceleration_limit / max(float(np.abs(path.spline(everywhere, 1)).max()), 1e-9)
     share = min(1.0, ramp / config.tip_acceleration)
-    tip = _TipLimits(acceleration=share * config.tip_acceleration, jerk=share * config.tip_jerk)
+    # A third of the joints' jerk likewise; the rest is for bends, and for ramps on bends.
+    soft = RAMPING * HEADROOM * config.joint_jerk_limit / max(float(np.abs(path.spline(everywhere, 1)).max()), 1e-9)
+    tip = _TipLimits(acceleration=share * config.tip_acceleration, jerk=min(share * config.tip_jerk, soft))
     edges, limit, asked = _speed_limits(rail, path, tip, config)
     s, ds, dds = _arc_profile(edges, limit, tip, config.period).T
     q1, q2 = path.spline(s, 1), path.spline(s, 2)
@@ -124,6 +127,11 @@ def _speed_limits(
     rate, bend = np.abs(path.spline(u, 1)).max(axis=(1, 2)), np.abs(path.spline(u, 2)).max(axis=(1, 2))
     left = HEADROOM * config.joint_acceleration_limit - rate * tip.acceleration
     allowed = np.minimum(HEADROOM * config.joint_speed_limit / np.maximum(rate, 1e-9), np.sqrt(left / np.maximum(bend, 1e-9)))
+    # The third derivative of q(s(t)) has three terms, q' by jerk, 3 q'' by speed and acceleration, q''' by the cube of speed:
+    # each with its share of the joint's jerk.
+    twist, jerk = np.abs(path.spline(u, 3)).max(axis=(1, 2)), HEADROOM * config.joint_jerk_limit
+    allowed = np.minimum(allowed, np.cbrt(TWISTING * jerk / np.maximum(twist, 1e-9)))
+    allowed = np.minimum(allowed, BENDING * jerk / np.maximum(3 * bend * tip.acceleration, 1e-9))
     return edges, np.minimum(asked, allowed), asked
 
 

@@ -3,13 +3,14 @@
 import json
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
 from tests.torch_paths import START, flat_curve, torch_path
 from weldsim.cli import main
 from weldsim.dryrun.cell import Cell, empty_cell, scene_cell
-from weldsim.dryrun.fix import moved_fix, passes, turned_about_wire
+from weldsim.dryrun.fix import leaned, moved_fix, passes, turned_about_wire
 from weldsim.dryrun.program import Program
 from weldsim.dryrun.read import read_program
 from weldsim.dryrun.run import dry_run
@@ -18,7 +19,10 @@ from weldsim.dryrun.verdict import dry_run_json, runs
 from weldsim.frames import Transform
 from weldsim.kinematics import torch_pose
 from weldsim.motion.config import MotionConfig
-from weldsim.records import TorchPath
+from weldsim.mounts import X_WB
+from weldsim.path.config import PathConfig
+from weldsim.path.plan import plan_path
+from weldsim.records import Seam, TorchPath
 from weldsim.scene.config import PartPoseConfig, SceneConfig
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -95,6 +99,32 @@ def test_the_first_failing_arc_length_is_found_to_a_millimetre() -> None:
     after = try_path(_part(path, failure.s + 0.004), "after", cell, replace(CONFIG, approach=0.0))
     assert before.passed
     assert not after.passed
+
+
+def test_a_clamp_in_the_torchs_way_is_named_and_without_it_the_weld_passes() -> None:
+    cell = scene_cell(SceneConfig())
+    clamps = [i for i in range(cell.model.ngeom) if cell.model.geom(i).name == "clamp_0_collision"]
+    data = mujoco.MjData(cell.model)
+    mujoco.mj_forward(cell.model, data)
+    nose = (X_WB.inverse() @ Transform("WB", np.eye(3), data.geom_xpos[clamps[0]])).p
+    path = line(x=nose[0], y=nose[1], z=nose[2], length=0.12)
+    result = dry_run(program(path), cell, CONFIG)
+    failure = result.trials[0].failure
+    assert failure is not None
+    assert failure.why == "collision"
+    assert "clamp_0" in (failure.first, failure.second)
+    fix = next(fix for fix in result.fixes[0] if fix.kind == "take away")
+    assert fix.body == "clamp_0"
+    assert try_path(path, "again", cell.without("clamp_0"), CONFIG).passed
+
+
+@pytest.mark.parametrize(("work", "travel"), [(0.2, 0.0), (0.0, 0.2), (-0.1, 0.0)])
+def test_a_lean_is_that_of_the_path_planner(work: float, travel: float) -> None:
+    path = line()
+    seam = Seam(points_B=path.X_BT.p, s=path.s, tangents_B=path.X_BT.R[:, :, 0], normals_B=-path.X_BT.R[:, :, 2], width=0.01)
+    asked = plan_path(seam, PathConfig(work_angle=work, travel_angle=travel)).X_BT
+    upright = plan_path(seam, PathConfig()).X_BT
+    assert np.abs(leaned(upright, work, travel).R[..., 2] - asked.R[..., 2]).max() < 1e-6
 
 
 def _part(path: TorchPath, end: float) -> TorchPath:

@@ -1,5 +1,7 @@
 """plan_motion on random seams: the tip stays on the path, the speed is the path's, the limits hold, verdicts are true."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -137,6 +139,23 @@ def test_limits_hold_and_slowness_is_said(speed: float) -> None:
     if speed >= 0.4:
         assert plan.slowest < 1.0
         assert any("slow" in note for note in plan.notes)
+
+
+@pytest.mark.parametrize("limit", [30.0, 350.0])
+@pytest.mark.parametrize(("seed", "kind", "speed"), [(20, "wave", 0.008), (21, "arc", 0.25), (22, "wave", 0.1), (23, "line", 0.03)])
+def test_jerk_is_never_exceeded(seed: int, kind: str, speed: float, limit: float) -> None:
+    path = random_path(seed, kind)
+    path = replace(path, speed=np.full(len(path.s), speed))
+    config = MotionConfig(joint_jerk_limit=limit)
+    trajectory = plan_motion(path, START, config).trajectory
+    jerk = np.diff(trajectory.qdd, axis=0) / config.period
+    assert np.abs(jerk).max() <= limit
+    # The speed is asked for wherever it can be kept: a jerk limit of the default size never slows a weld.
+    if limit == 350.0 and speed <= 0.03:
+        weld = _is(trajectory, Segment.WELD)
+        tip = np.diff(trajectory.s[weld]) / config.period
+        inner = np.abs(trajectory.s[weld][1:] - path.s[-1] / 2) < 0.4 * path.s[-1]
+        assert np.abs(tip[inner] / speed - 1).max() < 0.01
 
 
 def _reachable(X_BT: Transform) -> bool:

@@ -1,0 +1,50 @@
+"""The exported program is read back by the dry run, passes, and takes the torch along the path."""
+
+import numpy as np
+
+from tests.torch_paths import START, flat_curve, torch_path
+from weldsim.curves import project
+from weldsim.dryrun.cell import empty_cell
+from weldsim.dryrun.reach import reach_map
+from weldsim.dryrun.read import read_program
+from weldsim.dryrun.try_path import try_path
+from weldsim.dryrun.try_script import try_script
+from weldsim.execution.urscript import script_text
+from weldsim.kinematics import torch_pose
+from weldsim.motion.config import MotionConfig
+
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def test_the_exported_program_follows_the_path(tmp_path):
+    cell = empty_cell(START)
+    path = torch_path(flat_curve("wave", 0.12) + np.array([0.0, -0.45, 0.08]), DOWN)
+    trial = try_path(path, "seam", cell, MotionConfig())
+    assert trial.passed
+    assert trial.trajectory is not None
+    file = tmp_path / "weld.script"
+    file.write_text(script_text(trial.trajectory))
+    program = read_program(file)
+    again = try_script(program, cell)
+    assert again.passed, again.failure
+    tips = torch_pose(again.q[again.arc_on]).p
+    assert project(tips, path.X_BT.p)[0].max() < 0.2e-3
+    assert project(path.X_BT.p, tips)[0].max() < 0.2e-3
+    # Constant speed: as long as the planned weld, to the ramps and the holding of the last target.
+    welding = sum(motion.t for motion in program.motions if motion.arc)
+    assert abs(welding - trial.trajectory.arc_on.sum() * 0.008) < 0.25
+    assert np.abs(again.q[-1] - START).max() < 1e-6
+    assert not program.motions[-1].arc
+
+
+def test_the_reach_map_is_what_the_arm_can_do():
+    cell = empty_cell(START)
+    path = torch_path(flat_curve("line", 0.1) + np.array([0.0, -0.45, 0.08]), DOWN)
+    found = reach_map(path, cell, MotionConfig(), pitch=0.25)
+    # The place where it is now is one of them, and good; on the base itself nothing can be welded.
+    j, i = int(np.abs(found.x - found.now[0]).argmin()), int(np.abs(found.y - found.now[1]).argmin())
+    assert found.good[i, j]
+    near = np.hypot(*np.meshgrid(found.x, found.y)) < 0.12
+    assert near.any()
+    assert not found.good[near].any()
+    assert 0.2 < found.share < 0.98
