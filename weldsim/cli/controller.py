@@ -25,7 +25,7 @@ class Controller(ConfigOptions):
     """Serve, order a fault, or ask for the state."""
 
     fault: tyro.conf.Positional[Literal[FaultName, "none"]] = "none"
-    """With fault: which. recover lifts every stop and releases the brakes."""
+    """With fault: which. recover ends the program, lifts every stop and releases the brakes."""
 
     profile: Literal["cb3", "e"] = "cb3"
     """CB3 3.15 at 125 Hz or e-Series 5.11 at 500 Hz."""
@@ -40,7 +40,7 @@ class Controller(ConfigOptions):
     """Address to serve or to ask. The protocols know no password: an address that others can reach lets them move the arm."""
 
     seconds: float = 1.0
-    """With fault stall: how long."""
+    """With fault stall and link-drop: how long."""
 
     low_when_stopped: tuple[int, ...] = (0,)
     """Digital outputs that are dropped when no program runs any longer, the arc's say."""

@@ -36,15 +36,17 @@ def inject(server: "Server", name: str, seconds: float = 1.0) -> str:
         case "stall":
             server.stall(seconds)
         case "link-drop":
-            server.drop_links()
+            server.drop_links(seconds)
         case "foreign-program":
             machine.upload(FOREIGN)
         case "local-control":
-            machine.remote = False
+            machine.take_local()
         case "remote-control":
             machine.remote = True
         case "recover":
+            server.restore_links()
             machine.remote = True
+            machine.stop_program()
             machine.release()
             machine.lift()
             machine.power(RobotMode.RUNNING)

@@ -183,6 +183,13 @@ class Machine:
             self.safety_mode = SafetyMode.NORMAL
         return True
 
+    def take_local(self) -> None:
+        """Somebody at the pendant takes over: the program ends, clients may only look. A CB3 knows no such mode: nothing."""
+        if self.profile.remote_control:
+            self.remote = False
+            self.say("local control")
+            self.stop_program()
+
     def lift(self) -> None:
         """Lift a protective stop at once."""
         if self.safety_mode is SafetyMode.PROTECTIVE_STOP:

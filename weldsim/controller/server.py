@@ -48,7 +48,7 @@ class Server:
         # select() waits to the microsecond where epoll() waits to the millisecond.
         self._selector = selectors.SelectSelector()
         self._connections: list[Connection] = []
-        self._stalled_until = 0.0
+        self._stalled_until = self._cut_until = 0.0
         self.overruns, self.lost = 0, 0.0
         self._stopping = False
         for port, session in sessions.items():
@@ -137,7 +137,11 @@ class Server:
             sock, _ = listener.accept()
         except OSError:
             return  # gone again before it was served
-        connection = Connection(sock, session())
+        client = session()
+        if time.perf_counter() < self._cut_until and not isinstance(client, FaultSession):
+            sock.close()
+            return
+        connection = Connection(sock, client)
         self._connections.append(connection)
         self._selector.register(connection, selectors.EVENT_READ)
 
@@ -152,11 +156,16 @@ class Server:
         """Be silent for `seconds`: nothing is read or sent, while program and arm go on."""
         self._stalled_until = time.perf_counter() + seconds
 
-    def drop_links(self) -> None:
-        """Hang up on every client but those of the control port."""
+    def drop_links(self, seconds: float) -> None:
+        """Hang up on every client, and on whoever comes within `seconds`, but for those of the fault port."""
+        self._cut_until = time.perf_counter() + seconds
         for connection in self._connections:
             if not isinstance(connection.session, FaultSession):
                 connection.close()
+
+    def restore_links(self) -> None:
+        """Take clients again, and hear them."""
+        self._stalled_until = self._cut_until = 0.0
 
     def status(self) -> dict[str, object]:
         """What a person wants to know."""
