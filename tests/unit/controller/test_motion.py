@@ -119,6 +119,14 @@ def test_speedl_moves_the_tcp_and_stopl_rests(machine, axis):
     np.testing.assert_allclose(q[-1], q[-2], atol=1e-12)
 
 
+@pytest.mark.parametrize("move", ["movej(get_target_joint_positions())", "movel(get_target_tcp_pose())", "stopj(2)", "stopl(2)"])
+def test_move_to_where_the_arm_is_takes_a_period(machine, move):
+    assert machine.upload(f"while True:\n {move}\nend")
+    for _ in range(10):
+        machine.tick()
+    assert machine.runtime is RuntimeState.PLAYING, machine.log[-1]
+
+
 def test_arm_rests_in_time_when_its_program_is_stopped(machine):
     assert machine.upload("while True:\n speedj([2.5, 0, 0, 0, 0, 0], 8, 0.1)\nend")
     for _ in range(round(0.6 / machine.profile.period)):

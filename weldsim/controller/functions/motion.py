@@ -194,6 +194,8 @@ class MotionFunctions:
     def _along(self, at: Callable[[float], None], duration: float) -> Generator[None, None, bool]:
         """`at(elapsed)` every period up to `duration`; whether it got there, or was held and must be planned anew."""
         elapsed, before = 0.0, self._reference.q
+        if duration < LEAST_TIME:  # there already: a move takes one period all the same
+            yield
         while elapsed < duration - LEAST_TIME:
             if self._reference.q is not before:
                 return False  # something else moved the reference: a pause, a protective stop
