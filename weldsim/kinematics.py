@@ -16,6 +16,17 @@ A2, A3, D1, D4, D5, D6 = -0.425, -0.39225, 0.089159, 0.10915, 0.09465, 0.0823
 ALPHA = np.array([0.0, np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2])  # alpha_{i-1} [rad]
 A = np.array([0.0, 0.0, A2, A3, 0.0, 0.0])  # a_{i-1} [m]
 D = np.array([D1, 0.0, 0.0, D4, D5, D6])  # d_i [m]
+DH = np.array(
+    [
+        [0.0, 0.0, D1, np.pi / 2],
+        [0.0, A2, 0.0, 0.0],
+        [0.0, A3, 0.0, 0.0],
+        [0.0, 0.0, D4, np.pi / 2],
+        [0.0, 0.0, D5, -np.pi / 2],
+        [0.0, 0.0, D6, 0.0],
+    ]
+)
+"""The same arm as its controller tells it: theta offset [rad], a [m], d [m], alpha [rad] of each joint, in standard DH."""
 JOINT_LIMIT = 2 * np.pi  # [rad] each joint, both ways
 SPEED_LIMIT = np.pi  # [rad/s] each joint
 REACH = 0.85  # [m] published; beyond it a flange pose has no solution

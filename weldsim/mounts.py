@@ -11,6 +11,12 @@ from weldsim.records import CameraIntrinsics
 X_FT = Transform("FT", matrix_from_rotation_vector(np.array([np.deg2rad(-48.70), 0.0, 0.0])), np.array([0.0, 0.048, 0.227]))
 """Flange to torch tip at nominal stick-out."""
 
+PAYLOAD = 1.2
+"""Mass of torch, bracket and camera [kg]: an assumption, of the size of common light torches."""
+
+PAYLOAD_COG = np.array([0.0, -0.02, 0.08])
+"""Its centre in F [m]."""
+
 X_FC = Transform("FC", np.eye(3), np.array([-0.0356, -0.1161, 0.0739]))
 """Flange to the D415's optical frame (eye in hand)."""
 

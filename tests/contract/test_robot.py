@@ -10,7 +10,8 @@ from tests.torch_paths import START
 from weldsim.errors import ExecutionError
 from weldsim.execution.robot import Robot
 from weldsim.execution.simulated import SimulatedRobot
-from weldsim.kinematics import torch_pose
+from weldsim.kinematics import DH, torch_pose
+from weldsim.mounts import PAYLOAD, X_FT
 
 ROBOTS: dict[str, Callable[[], Robot]] = {"simulated": lambda: SimulatedRobot(bare_model(), START)}
 STILL = np.zeros(6)
@@ -24,6 +25,21 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 def test_command_before_connect_is_refused(robot: Robot) -> None:
     with pytest.raises(ExecutionError, match="connect"):
         robot.servo(START, STILL)
+
+
+def test_facts_are_those_of_our_arm_and_mount(robot: Robot) -> None:
+    with pytest.raises(ExecutionError, match="connect"):
+        robot.facts()
+    with robot:
+        facts = robot.facts()
+        assert (facts.model, facts.safety, facts.mode) == ("UR5", "normal", "running")
+        assert not facts.program_running
+        assert facts.remote_control is not False
+        assert facts.X_FT is not None
+        assert np.abs(facts.X_FT.matrix - X_FT.matrix).max() < 1e-6
+        assert facts.payload_kg == pytest.approx(PAYLOAD)
+        if facts.dh is not None:
+            assert np.abs(facts.dh - DH).max() < 5e-3
 
 
 def test_state_is_consistent_and_moves_with_time(robot: Robot) -> None:

@@ -6,7 +6,7 @@ from types import TracebackType
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.records import Event, RobotState
+from weldsim.records import Event, RobotFacts, RobotState
 
 
 class Robot(ABC):
@@ -31,6 +31,10 @@ class Robot(ABC):
     @abstractmethod
     def state(self) -> RobotState:
         """What the robot reports now, never what was asked of it."""
+
+    @abstractmethod
+    def facts(self) -> RobotFacts:
+        """What the controller says about itself, read anew; the robot must be connected. Raises ExecutionError."""
 
     @abstractmethod
     def servo(self, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> Float[ndarray, "6"]:

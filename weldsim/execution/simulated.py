@@ -18,8 +18,9 @@ from weldsim.errors import ExecutionError
 from weldsim.execution.config import SimulationConfig
 from weldsim.execution.robot import Robot
 from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_NAMES
-from weldsim.records import Event, RobotState
+from weldsim.kinematics import DH, JOINT_NAMES
+from weldsim.mounts import PAYLOAD, PAYLOAD_COG, X_FT
+from weldsim.records import Event, RobotFacts, RobotState
 
 BASE_BODY, FLANGE_BODY, TORCH_SITE = "ur5_base", "wrist_3_link", "torch_tip"
 
@@ -102,6 +103,25 @@ class SimulatedRobot(Robot):
         if self._connected:
             self.stop()
         self._connected, self._mode = False, "idle"
+
+    def facts(self) -> RobotFacts:
+        """What this arm's controller believes: the nominal arm and mount, however the twin's cell really is."""
+        if not self._connected:
+            raise ExecutionError(f"{self.name}: asked for facts before connect()", rule="connection", t=self.t)
+        return RobotFacts(
+            model="UR5",
+            series="simulated",
+            version=mujoco.__version__,
+            serial="0",
+            dh=DH,
+            X_FT=X_FT,
+            payload_kg=PAYLOAD,
+            payload_cog=PAYLOAD_COG,
+            remote_control=True,
+            safety="normal",
+            mode=self._mode,
+            program_running=False,
+        )
 
     def state(self) -> RobotState:
         data = self.data

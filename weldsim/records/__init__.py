@@ -6,7 +6,7 @@ array is expressed in the robot base.
 """
 
 from weldsim.records.checks import MILLIMETRE_SPAN
-from weldsim.records.execution import Event, ExecutionLog, RobotState
+from weldsim.records.execution import Event, ExecutionLog, RobotFacts, RobotState
 from weldsim.records.motion import JointTrajectory, Segment, TorchPath
 from weldsim.records.report import LineError, WeldReport
 from weldsim.records.seam import Joint, KnownSeam, Reference, Rejection, Seam, SeamFindings, Threshold
@@ -25,6 +25,7 @@ __all__ = [
     "PointCloud",
     "Reference",
     "Rejection",
+    "RobotFacts",
     "RobotState",
     "Seam",
     "SeamFindings",

@@ -29,6 +29,43 @@ class RobotState:
             store(self, name, getattr(self, name), shape=(6,))
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RobotFacts:
+    """What a controller says about itself and the tool it believes in; None where it cannot say.
+
+    Attributes:
+        model: of the arm, "UR5" say.  series: of the controller, "cb3", "e" or "simulated".
+        version: of its software, "3.15.8" say.  serial: of the arm.
+        dh: (6, 4) DH parameters (theta offset [rad], a [m], d [m], alpha [rad]) a joint, factory calibration included, in UR's
+            own convention (standard DH: a and alpha lie behind the joint's d).
+        X_FT: flange to torch tip.  payload_kg: mass on the flange [kg].  payload_cog: (3,) its centre in F [m].
+        remote_control: whether it may be commanded from outside; None where there is no such switch.
+        safety: state of the safety system, "normal" where nothing is wrong.  mode: of the arm, "running" when it can move.
+        program_running: whether a program that is not ours runs.
+    """
+
+    model: str
+    series: str
+    version: str
+    serial: str
+    dh: Float[ndarray, "6 4"] | None = None
+    X_FT: Transform | None = None
+    payload_kg: float | None = None
+    payload_cog: Float[ndarray, "3"] | None = None
+    remote_control: bool | None = None
+    safety: str = "normal"
+    mode: str = "running"
+    program_running: bool = False
+
+    def __post_init__(self) -> None:
+        if self.dh is not None:
+            store(self, "dh", self.dh, shape=(6, 4))
+        if self.payload_cog is not None:
+            store(self, "payload_cog", self.payload_cog, shape=(3,))
+        if self.X_FT is not None:
+            require(self.X_FT.names == "FT" and self.X_FT.batch == (), self, "X_FT", "must be one X_FT")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Event:
     """Something that happened while executing. Attributes: t [s], kind, text."""

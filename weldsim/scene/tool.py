@@ -6,19 +6,18 @@ from itertools import pairwise
 import numpy as np
 
 from weldsim.frames import Transform
-from weldsim.mounts import D415_640X480, X_FC, X_FT
+from weldsim.mounts import D415_640X480, PAYLOAD, PAYLOAD_COG, X_FC, X_FT
 from weldsim.records import CameraIntrinsics
 from weldsim.scene.shapes import Body, Group, box, camera, rod
 
 STICK_OUT = 0.015  # [m] wire beyond the contact tip
-TOOL_MASS = 1.2  # [kg] torch, bracket and camera: an assumption, of the size of common light torches
 GRAVITY_COMPENSATION = 1.0  # share of the tool's weight that the controller knows of (its payload setting)
 
 
 def add_tool(flange: Body, intrinsics: CameraIntrinsics = D415_640X480) -> None:
     """Add torch, bracket, D415, the sites and the camera to the flange's body, whose frame is F."""
     tool = flange.add_body(name="tool", gravcomp=GRAVITY_COMPENSATION)
-    tool.mass, tool.ipos = TOOL_MASS, [0.0, -0.02, 0.08]
+    tool.mass, tool.ipos = PAYLOAD, PAYLOAD_COG
     tool.inertia = [0.0055, 0.0045, 0.0035]
     tool.explicitinertial = True
     _add_torch(tool)

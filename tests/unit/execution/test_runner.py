@@ -16,7 +16,7 @@ from weldsim.execution.runner import at_period, execute
 from weldsim.execution.simulated import SimulatedRobot
 from weldsim.kinematics import torch_pose
 from weldsim.motion.plan import plan_motion
-from weldsim.records import ExecutionLog, JointTrajectory, RobotState, Segment
+from weldsim.records import ExecutionLog, JointTrajectory, RobotFacts, RobotState, Segment
 
 PATH = torch_path(flat_curve("arc", 0.04) + np.array([0.0, -0.48, 0.06]), np.array([0.0, 0.0, -1.0]), speed=0.01)
 
@@ -44,6 +44,9 @@ class PerfectRobot(Robot):
 
     def state(self) -> RobotState:
         return RobotState(t=self.count * self.period, q=self.q, qd=self.qd, X_BT=torch_pose(self.q))
+
+    def facts(self) -> RobotFacts:
+        return RobotFacts(model="UR5", series="simulated", version="1", serial="0")
 
     def servo(self, q: ndarray, qd: ndarray) -> ndarray:
         if self.count == self.fail_at:
