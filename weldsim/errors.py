@@ -73,5 +73,11 @@ class UnreachableError(MotionError):
     """No joint solution within limits for a torch pose. `data`: index, position, distance, reach."""
 
 
+class ViewError(UnreachableError):
+    """A scene asks for a view of its part that the arm cannot take: the scene is at fault. `data`: view, position."""
+
+    exit_code = 2
+
+
 class ExecutionError(MotionError):
     """The arm was stopped while moving. `data`: rule, value, limit, t."""

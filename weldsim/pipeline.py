@@ -100,7 +100,7 @@ def look(
         move: whether the arm is driven from view to view and starts the weld from there (never for the Kinect), or put there.
         world: `scene` already built, by whoever looks at it several times.  clock: takes the times.
     Raises:
-        SceneError, UnreachableError, SensorError, CloudError: see the stages.
+        SceneError, ViewError, SensorError, CloudError: see the stages.
     """
     from weldsim.scene.world import build_world
 

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.spatial import KDTree
 
-from weldsim.errors import UnreachableError
+from weldsim.errors import ViewError
 from weldsim.frames import Transform, matrix_from_rotation_vector, unit
 from weldsim.scan.config import ScanConfig
 from weldsim.scan.sight import Sight, make_sight
@@ -50,7 +50,7 @@ def plan_views(world: "World", config: ScanConfig | None = None) -> ViewPlan:
     normal and hidden by nothing.
 
     Raises:
-        UnreachableError: places that no reachable view sees; the message says on which side of the part, and why.
+        ViewError: places that no reachable view sees; the message says on which side of the part, and why.
     """
     config = config or ScanConfig()
     sight = make_sight(world)
@@ -238,7 +238,7 @@ def _unseen(
     refused: dict[int, str],
     covered: float,
     config: ScanConfig,
-) -> UnreachableError:
+) -> ViewError:
     """Which side of the part is not seen and why."""
     missing = ~seen
     facing = np.rint(world.X_BP.inverse().vectors(normals[missing]))
@@ -254,7 +254,7 @@ def _unseen(
         why = f"{len(reasons)} of {len(able)} poses that see it were tried: " + max(set(reasons), key=reasons.count)
     else:
         why = f"more than {config.most} views would be needed, or views that bring less than {WORTH:.0%}"
-    return UnreachableError(
+    return ViewError(
         f"scan: {1 - covered:.0%} of the groove's surroundings (limit {1 - config.coverage:.0%}) cannot be seen, most of it on the"
         f" part's {' '.join(names) or 'slanted'} side about ({middle[0]:.3f}, {middle[1]:.3f}, {middle[2]:.3f}) m in base: {why};"
         " turn or move the part, or give views by hand",

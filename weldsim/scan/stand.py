@@ -19,7 +19,7 @@ def scan(world: "World", tables: SensorTables, seed: int = 0, sensor: SensorName
     Args:
         world: the scene.  tables: settings of the cameras.  seed: of the camera's noise.  sensor: which camera looks.
     Raises:
-        UnreachableError: a view that the arm cannot take.  SensorError: nothing draws here.
+        ViewError: a view that the arm cannot take.  SensorError: nothing draws here.
     """
     from weldsim.sensor.base import View
     from weldsim.sensor.exact import twin_scene

@@ -62,7 +62,7 @@ def drive(
         motion, execution: limits of the air moves; how the simulated arm behaves.
         tell: told the fraction done.
     Raises:
-        UnreachableError: a view that the arm cannot take.  MotionError: one that it cannot get to; `data`: view, reason.
+        ViewError: a view that the arm cannot take.  MotionError: one that it cannot get to; `data`: view, reason.
         ExecutionError, SensorError: the arm or the camera cannot.
     """
     from weldsim.execution.runner import execute

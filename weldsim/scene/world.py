@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from weldsim.errors import SceneError, UnreachableError
+from weldsim.errors import SceneError, ViewError
 from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, inverse
 from weldsim.mounts import D415_640X480, X_FC, X_WB
@@ -87,7 +87,7 @@ class World:
         """Joint angles [rad] that put the wrist camera at the view, touch nothing and leave the part in sight, nearest to `near`.
 
         Raises:
-            UnreachableError: no solution, or only ones that collide or hold the arm between camera and part.
+            ViewError: no solution, or only ones that collide or hold the arm between camera and part.
         """
         X_BF = self.views[view] @ X_FC.inverse()
         solutions = inverse(X_BF)
@@ -99,7 +99,7 @@ class World:
             if data.ncon == 0 and (np.abs(q) <= JOINT_LIMIT).all() and self._part_in_sight(data):
                 return q
         reason = "every joint solution collides or hides the part" if len(solutions) else "no joint solution"
-        raise UnreachableError(
+        raise ViewError(
             f"scan view {view}: {reason} with the flange at ({X_BF.p[0]:.3f}, {X_BF.p[1]:.3f}, {X_BF.p[2]:.3f}) m in base;"
             " change the view's standoff, tilt or roll, or move the part",
             view=view,

@@ -76,7 +76,7 @@ def posture(world: "World", name: SensorName, view: int) -> "Float[ndarray, '6']
     """Joint angles [rad] during an exposure: holding the wrist camera at its view, or turned away from under the Kinect.
 
     Raises:
-        UnreachableError: a view that the arm cannot take.
+        ViewError: a view that the arm cannot take.
     """
     from weldsim.scene.world import AWAY
 

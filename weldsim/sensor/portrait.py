@@ -31,7 +31,7 @@ def portrait(scene: SceneConfig, camera: str = "overview", view: int = 0) -> byt
     The wrist camera's pictures are taken with the arm where it holds the camera, the overhead camera's with it turned away.
 
     Raises:
-        SceneError: a scene that contradicts itself.  UnreachableError: a view that the arm cannot take.
+        SceneError: a scene that contradicts itself.  ViewError: a view that the arm cannot take.
         SensorError: nothing draws here.
     """
     world = build_world(scene)
