@@ -13,8 +13,8 @@ from weldsim.controller.arm import Arm
 from weldsim.controller.config import ControllerConfig
 from weldsim.controller.functions import builtins
 from weldsim.controller.machine import Machine
-from weldsim.controller.ports import FAULTS
 from weldsim.controller.profile import PROFILES, Series
+from weldsim.execution.ur_ports import FAULTS
 from weldsim.scene.world import HOME
 
 

@@ -16,9 +16,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from weldsim.controller.packet import Packet, PacketReader, PacketType
-from weldsim.controller.ports import RTDE
 from weldsim.controller.profile import PROFILES
+from weldsim.execution.rtde_packet import Packet, PacketReader, PacketType
+from weldsim.execution.ur_ports import RTDE
 
 HOSTS = {"cb3": "127.11.0.1", "e": "127.11.0.2"}
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests.controllers import served, wait_for
 from weldsim.controller.ask import ask
-from weldsim.controller.modes import SafetyMode
+from weldsim.execution.ur_modes import SafetyMode
 
 PERIOD = {"cb3": 0.008, "e": 0.002}
 AT_REST = 0.02  # [rad/s]

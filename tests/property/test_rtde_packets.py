@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from weldsim.controller.inputs import InputRecipe
-from weldsim.controller.packet import HEADER, Packet, PacketReader, ProtocolError, layout, unpack_values, width
 from weldsim.controller.registers import Registers
+from weldsim.execution.rtde_packet import HEADER, Packet, PacketReader, ProtocolError, layout, unpack_values, width
 
 NUMBER = {
     "BOOL": st.booleans(),

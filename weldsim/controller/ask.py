@@ -5,8 +5,8 @@ import socket
 from collections.abc import Mapping
 from typing import Any
 
-from weldsim.controller.ports import FAULTS
 from weldsim.errors import InputError
+from weldsim.execution.ur_ports import FAULTS
 
 PATIENCE = 5.0  # [s]
 

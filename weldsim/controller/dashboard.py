@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from weldsim.controller.machine import Machine
-from weldsim.controller.modes import RobotMode, RuntimeState
+from weldsim.execution.ur_modes import RobotMode, RuntimeState
 
 BANNER = b"Connected: Universal Robots Dashboard Server\n"
 MAX_LINE = 65536

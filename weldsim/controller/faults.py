@@ -4,8 +4,8 @@ import json
 from typing import TYPE_CHECKING, get_args
 
 from weldsim.controller.fault_names import FaultName
-from weldsim.controller.modes import RobotMode
 from weldsim.errors import InputError
+from weldsim.execution.ur_modes import RobotMode
 
 if TYPE_CHECKING:
     from weldsim.controller.server import Server

@@ -4,8 +4,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from weldsim.controller.packet import unpack_values
 from weldsim.controller.registers import BITS, DOUBLES, INTEGERS, Registers
+from weldsim.execution.rtde_packet import unpack_values
 
 _FIXED = {
     "speed_slider_mask": "UINT32",

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping
 
 from weldsim.controller.arm import Arm
 from weldsim.controller.config import ControllerConfig
-from weldsim.controller.modes import RobotMode, RuntimeState, SafetyMode
 from weldsim.controller.poses import matrix_of
 from weldsim.controller.profile import Profile
 from weldsim.controller.reference import Reference
@@ -19,6 +18,7 @@ from weldsim.controller.urscript.compiler import Compiled, compile_program
 from weldsim.controller.urscript.errors import ScriptError
 from weldsim.controller.urscript.program import Program
 from weldsim.controller.watchdog import Watchdogs
+from weldsim.execution.ur_modes import RobotMode, RuntimeState, SafetyMode
 
 LOG_LINES = 500
 

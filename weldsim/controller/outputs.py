@@ -4,9 +4,9 @@ import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from weldsim.controller.packet import layout, width
 from weldsim.controller.profile import Profile
 from weldsim.controller.registers import BITS, DOUBLES, INTEGERS
+from weldsim.execution.rtde_packet import layout, width
 
 if TYPE_CHECKING:
     from weldsim.controller.snapshot import Snapshot

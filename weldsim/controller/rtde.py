@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from weldsim.controller.inputs import InputRecipe
 from weldsim.controller.machine import Machine
 from weldsim.controller.outputs import OutputRecipe
-from weldsim.controller.packet import Packet, PacketReader, PacketType, ProtocolError
+from weldsim.execution.rtde_packet import Packet, PacketReader, PacketType, ProtocolError
 
 VERSIONS = (1, 2)
 MAX_RECIPES = 255

@@ -16,10 +16,10 @@ from weldsim.controller.dashboard import Dashboard, DashboardSession
 from weldsim.controller.faults import FaultSession
 from weldsim.controller.functions import builtins
 from weldsim.controller.machine import Machine
-from weldsim.controller.ports import DASHBOARD, FAULTS, PRIMARY, REALTIME, RTDE, SECONDARY
 from weldsim.controller.rtde import Claims, RtdeSession
 from weldsim.controller.script_port import ScriptSession
 from weldsim.errors import InputError
+from weldsim.execution.ur_ports import DASHBOARD, FAULTS, PRIMARY, REALTIME, RTDE, SECONDARY
 
 CATCH_UP = 0.1  # [s] of lateness made good by periods without a pause; what is more is lost time
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from weldsim.controller.kinematics import jacobian, tcp_pose
-from weldsim.controller.modes import RobotMode, RuntimeState, safety_bits
+from weldsim.execution.ur_modes import RobotMode, RuntimeState, safety_bits
 from weldsim.kinematics import link_frames
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from tests.controllers import new_machine
 from weldsim.controller.config import ControllerConfig
 from weldsim.controller.dashboard import BANNER, LOCAL, Dashboard, DashboardSession
 from weldsim.controller.machine import Machine
-from weldsim.controller.modes import RobotMode
+from weldsim.execution.ur_modes import RobotMode
 
 LOOP = "def job():\n while True:\n  sync()\n end\nend"
 

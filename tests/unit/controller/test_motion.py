@@ -7,8 +7,8 @@ import pytest
 
 from tests.controllers import new_machine, run_program
 from weldsim.controller.machine import Machine
-from weldsim.controller.modes import RuntimeState, SafetyMode
 from weldsim.controller.trapezoid import Trapezoid
+from weldsim.execution.ur_modes import RuntimeState, SafetyMode
 from weldsim.frames import Transform
 from weldsim.kinematics import SPEED_LIMIT, flange_pose
 from weldsim.scene.world import HOME

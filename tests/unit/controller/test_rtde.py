@@ -7,9 +7,9 @@ import pytest
 from tests.controllers import new_machine
 from weldsim.controller.machine import Machine
 from weldsim.controller.outputs import OutputRecipe, find_output
-from weldsim.controller.packet import Packet, PacketReader, PacketType, unpack_values
 from weldsim.controller.profile import PROFILES
 from weldsim.controller.rtde import Claims, RtdeSession
+from weldsim.execution.rtde_packet import Packet, PacketReader, PacketType, unpack_values
 
 
 @pytest.fixture
