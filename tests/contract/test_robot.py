@@ -1,25 +1,45 @@
 """What every Robot does, whichever it is: one suite for all implementations."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 
 from tests.arm_worlds import bare_model
 from tests.torch_paths import START
+from tests.ur_robots import controlled, ur_robot
 from weldsim.errors import ExecutionError
 from weldsim.execution.robot import Robot
 from weldsim.execution.simulated import SimulatedRobot
+from weldsim.execution.ur_config import Series
 from weldsim.kinematics import DH, torch_pose
 from weldsim.mounts import PAYLOAD, X_FT
 
-ROBOTS: dict[str, Callable[[], Robot]] = {"simulated": lambda: SimulatedRobot(bare_model(), START)}
 STILL = np.zeros(6)
 
 
-@pytest.fixture(params=ROBOTS)
-def robot(request: pytest.FixtureRequest) -> Robot:
-    return ROBOTS[request.param]()
+def simulated() -> Iterator[Callable[[], Robot]]:
+    yield lambda: SimulatedRobot(bare_model(), START)
+
+
+def real(series: Series) -> Iterator[Callable[[], Robot]]:
+    """Over sockets, as in the cell."""
+    pytest.importorskip("rtde_control", reason="the extra `ur` is not installed")
+    with controlled(series) as host:
+        yield lambda: ur_robot(host, START)
+
+
+ROBOTS = {"simulated": simulated, "ur-cb3": lambda: real("cb3"), "ur-e": lambda: real("e")}
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def new_robot(request: pytest.FixtureRequest) -> Iterator[Callable[[], Robot]]:
+    yield from ROBOTS[request.param]()
+
+
+@pytest.fixture
+def robot(new_robot: Callable[[], Robot]) -> Robot:
+    return new_robot()
 
 
 def test_command_before_connect_is_refused(robot: Robot) -> None:
@@ -56,13 +76,13 @@ def test_state_is_consistent_and_moves_with_time(robot: Robot) -> None:
 
 def test_servo_returns_what_was_sent_and_gets_there(robot: Robot) -> None:
     with robot:
-        steps = 60
+        steps = round(0.48 / robot.period)
         for k in range(1, steps + 1):
             u = k / steps
             q = START + 0.05 * (3 * u**2 - 2 * u**3)
             qd = np.full(6, 0.05 * (6 * u - 6 * u**2) / (steps * robot.period))
             assert (robot.servo(q, qd) == q).all()
-        for _ in range(20):
+        for _ in range(round(0.16 / robot.period)):
             robot.servo(START + 0.05, STILL)
         assert np.abs(robot.state().q - START - 0.05).max() < 1e-3
 
@@ -70,9 +90,10 @@ def test_servo_returns_what_was_sent_and_gets_there(robot: Robot) -> None:
 def test_stop_drops_the_arc_and_rests_within_300_ms(robot: Robot) -> None:
     with robot:
         speed = np.array([1.0, -0.5, 0.5, 1.0, -1.0, 1.0])
-        for k in range(1, 40):
+        last = round(0.32 / robot.period)
+        for k in range(1, last):
             u = min(1.0, k * robot.period / 0.2)
-            robot.set_arc(k > 20)
+            robot.set_arc(k > last // 2)
             robot.servo(robot.state().q + speed * u * robot.period, speed * u)
         assert robot.arc
         began = robot.state().t

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from weldsim.errors import ConfigError
+from weldsim.execution.ur_config import UrConfig
 from weldsim.quantity import Radian, Second, require_within
 
 RANGES = {
@@ -55,6 +56,8 @@ class ExecutionConfig:
     """Time the last point is held, so that the log ends with the arm at rest."""
     simulation: SimulationConfig = field(default_factory=SimulationConfig)
     """How the simulated arm behaves."""
+    ur: UrConfig = field(default_factory=UrConfig)
+    """How a UR arm is reached and driven."""
 
     def __post_init__(self) -> None:
         require_within(self, RANGES, "execution")

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from numpy import ndarray
+
 from weldsim.errors import ConfigError
 from weldsim.mounts import PAYLOAD, PAYLOAD_COG, X_FT
 from weldsim.quantity import Second, require_within
@@ -26,6 +28,16 @@ RANGES = {
     "payload": (0.0, 5.0),
 }
 TCP_LIMIT, COG_LIMIT = 1.0, 0.5  # [m] farther from the flange is a mistake of units
+
+Point = tuple[float, float, float]
+Pose = tuple[float, float, float, float, float, float]
+
+
+def _three(values: ndarray) -> Point:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+_TCP, _COG = (*_three(X_FT.p), *_three(X_FT.rotation_vector)), _three(PAYLOAD_COG)
 
 
 @dataclass(frozen=True)
@@ -62,12 +74,9 @@ class UrConfig:
     """Longest time that a stop waits to see arm and arc at rest."""
     payload: float = PAYLOAD
     """Mass on the flange that the controller is told [kg]."""
-    payload_cog: tuple[float, float, float] = (float(PAYLOAD_COG[0]), float(PAYLOAD_COG[1]), float(PAYLOAD_COG[2]))
+    payload_cog: Point = _COG
     """Its centre in F [m]."""
-    tcp: tuple[float, float, float, float, float, float] = (
-        *(float(x) for x in X_FT.p),
-        *(float(r) for r in X_FT.rotation_vector),
-    )  # type: ignore[assignment] - three and three
+    tcp: Pose = _TCP
     """X_FT that the controller is told: position [m] and rotation vector [rad] of the torch tip in the flange."""
 
     def __post_init__(self) -> None:

@@ -11,7 +11,6 @@ from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
-import weldsim
 from weldsim.errors import WeldsimError
 from weldsim.execution.ur_client import MAX_MESSAGE, ClientSettings
 
@@ -45,7 +44,7 @@ class ClientProcess:
         self._channel.setblocking(False)
         self._timeout = answer_timeout
         self._noise = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `kill`; what the library prints; a pipe that nobody reads would fill up and block
-        root = str(Path(weldsim.__file__).resolve().parents[1])
+        root = str(Path(__file__).resolve().parents[2])
         path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
         with theirs:
             self._process = subprocess.Popen(

@@ -5,13 +5,14 @@ crashes: all of this runs in a process that can be killed (`ur_client`), never i
 """
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from weldsim.errors import ExecutionError
 
 INSTALL = "pip install ur_rtde"
 
 
+@runtime_checkable
 class Control(Protocol):
     """What is used of `RTDEControlInterface`."""
 
@@ -27,6 +28,7 @@ class Control(Protocol):
     def disconnect(self) -> None: ...
 
 
+@runtime_checkable
 class Signals(Protocol):
     """What is used of `RTDEIOInterface`."""
 

@@ -1,0 +1,44 @@
+"""UrRobots for tests, each on a virtual controller of its own process."""
+
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from numpy import ndarray
+
+from tests.controllers import served, wait_for
+from weldsim.controller.ask import ask
+from weldsim.execution.ur_config import Series, UrConfig
+from weldsim.execution.ur_ports import REALTIME
+from weldsim.execution.ur_robot import UrRobot
+
+SPEED, ACCELERATION = 2.0, 6.0  # [rad/s], [rad/s2] of the way to where a test begins
+
+
+@contextmanager
+def controlled(series: Series, *options: str) -> Iterator[str]:
+    """The address of a controller of a series, until the block ends."""
+    with served("--profile", series, *options) as host:
+        yield host
+
+
+def place(host: str, q: ndarray) -> None:
+    """The arm at rest at q, nothing running and nothing wrong."""
+    ask(host, {"fault": "recover"})
+    program = f"def go():\n  movej([{', '.join(f'{x:.9f}' for x in q)}], a={ACCELERATION}, v={SPEED})\nend\n"
+    with socket.create_connection((host, REALTIME), 2.0) as sock:
+        sock.sendall(program.encode())
+        assert wait_for(lambda: _there(host, q), 10.0)
+
+
+def _there(host: str, q: ndarray) -> bool:
+    now = ask(host, {"status": True})
+    return not now["program"] and bool(np.abs(np.array(now["q"]) - q).max() < 5e-4)
+
+
+def ur_robot(host: str, q: ndarray | None = None, **settings: object) -> UrRobot:
+    """A UrRobot, not connected, whose arm rests at q; where it is, without one."""
+    if q is not None:
+        place(host, q)
+    return UrRobot(UrConfig(host=host, **settings))  # type: ignore[arg-type]
