@@ -26,6 +26,8 @@ MOST_VIEWS = 24  # more than these share one chart
 FEWEST_POINTS = 300  # in a view that has a chart of its own
 GRAZING = 0.15  # cosine to the normal under which a sight line says nothing about a surface
 FACING = 0.5  # cosine to the normal from which on a chart shows whether a surface dips
+DEEPEST = 0.020  # [m] below the surface, down to which points are told apart by where their sight lines enter it
+AHEAD = 4  # points of a line to either side that tell which way it leads
 STRETCH = 0.010  # [m] of a line over which the same views are used
 FEWEST_IN_STRETCH = 20  # points near such a stretch that a view must have to cover it
 CROSSING = 0.6  # [rad] between the sight lines of two views from which on they cross
@@ -107,7 +109,11 @@ class Atlas:
     def _near_in_space(
         self, index: Int[ndarray, "j"], line: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"]
     ) -> Int[ndarray, "m"]:
-        """Those of the points that lie near a line in space and were seen from above its surface."""
+        """Those of the points that lie near a line in space and were seen from above its surface, by the views best there.
+
+        A point in the groove belongs to the stretch at which its sight line enters it: where one view takes over from
+        another that looks aslant along the groove, its bottom would else be seen by neither.
+        """
         points = self.cloud.points[index]
         low, high = line.min(axis=0) - 1.3 * SURROUNDINGS, line.max(axis=0) + 1.3 * SURROUNDINGS
         box: Bool[ndarray, "j"] = ((points > low) & (points < high)).all(axis=1)
@@ -119,11 +125,14 @@ class Atlas:
         if view is None or len(self.cloud.viewpoints) == 0:
             return index
         sight = self.cloud.viewpoints[view[index]] - points
-        above = np.einsum("ij,ij->i", sight, normals[nearest]) > GRAZING * np.linalg.norm(sight, axis=1)
-        index, nearest = index[above], nearest[above]
-        stretch = np.floor(arc_length(line) / STRETCH).astype(int)
-        allowed = _views_by_stretch(self.cloud.viewpoints, view[index], stretch[nearest], line, normals)
-        return index[allowed[view[index], stretch[nearest]]]
+        rise = np.einsum("ij,ij->i", sight, normals[nearest])
+        above = rise > GRAZING * np.linalg.norm(sight, axis=1)
+        index, nearest, sight = index[above], nearest[above], sight[above] / rise[above, None]
+        offset = self.cloud.points[index] - line[nearest]
+        below = np.clip(-np.einsum("ij,ij->i", offset, normals[nearest]), 0.0, DEEPEST)
+        stretch, left = _places(line, normals, nearest, offset + below[:, None] * sight)
+        allowed = _views_by_stretch(self.cloud.viewpoints, view[index], stretch, left, line, normals)
+        return index[allowed[view[index], stretch]]
 
 
 def make_atlas(cloud: PointCloud) -> Atlas:
@@ -167,10 +176,27 @@ def _near(chart: Chart, line: Float[ndarray, "k 3"]) -> Int[ndarray, "m"]:
     return np.flatnonzero(np.concatenate([near.ravel(), [False]])[chart.cell])
 
 
+def _places(
+    line: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], nearest: Int[ndarray, "m"], offset: Float[ndarray, "m 3"]
+) -> tuple[Int[ndarray, "m"], Bool[ndarray, "m"]]:
+    """On which stretch of a line points lie, the first beyond its beginning and the last beyond its end; and whether to its left.
+
+    Args:
+        line, normals: as in `Atlas.around`.  nearest: (m,) point of the line nearest to each.  offset: (m, 3) from there [m].
+    """
+    at = np.arange(len(line))
+    ahead = unit(line[np.minimum(at + AHEAD, len(line) - 1)] - line[np.maximum(at - AHEAD, 0)])
+    along = arc_length(line)[nearest] + np.einsum("ij,ij->i", offset, ahead[nearest])
+    left = np.einsum("ij,ij->i", offset, np.cross(normals, ahead)[nearest]) > 0
+    stretch = np.floor(along / STRETCH).astype(int)
+    return stretch - stretch.min(initial=0), left
+
+
 def _views_by_stretch(
     viewpoints: Float[ndarray, "v 3"],
     view: Int[ndarray, "m"],
     stretch: Int[ndarray, "m"],
+    left: Bool[ndarray, "m"],
     line: Float[ndarray, "k 3"],
     normals: Float[ndarray, "k 3"],
 ) -> Bool[ndarray, "v b"]:
@@ -178,14 +204,16 @@ def _views_by_stretch(
 
     A groove looks different from the left and from the right: its far wall is hidden, and a stereo camera blurs along its
     own image. Points of sight lines that cross are two pictures of it, whose mean is the picture of another groove.
+    Where an image ends aslant across the groove, its view shows the plate on one side only, and covers that stretch no more.
 
     Args:
-        viewpoints: [m].  view, stretch: (m,) of each point near the line.
+        viewpoints: [m].  view, stretch, left: (m,) of each point near the line, and on which side of it.
     """
-    count = np.zeros((len(viewpoints), int(stretch.max(initial=0)) + 1))
-    np.add.at(count, (view, stretch), 1.0)
-    usual = np.array([np.median(row[row > 0]) if (row > 0).any() else np.inf for row in count])
-    covered = count >= np.maximum(0.5 * usual, FEWEST_IN_STRETCH)[:, None]
+    stretches = int(stretch.max(initial=0)) + 1
+    place = (view * stretches + stretch) * 2 + left
+    count = np.bincount(place, minlength=2 * stretches * len(viewpoints)).reshape(len(viewpoints), stretches, 2).astype(float)
+    usual = np.array([[np.median(side[side > 0]) if side.any() else np.inf for side in each.T] for each in count])[:, None]
+    covered = (count >= np.maximum(0.5 * usual, 0.5 * FEWEST_IN_STRETCH)).all(axis=2)
     away = viewpoints - line.mean(axis=0)
     distance = np.linalg.norm(away, axis=1)
     sight = away / distance[:, None]
