@@ -26,7 +26,7 @@ MOST_VIEWS = 24  # more than these share one chart
 FEWEST_POINTS = 300  # in a view that has a chart of its own
 GRAZING = 0.15  # cosine to the normal under which a sight line says nothing about a surface
 FACING = 0.5  # cosine to the normal from which on a chart shows whether a surface dips
-DEEPEST = 0.020  # [m] below the surface, down to which points are told apart by where their sight lines enter it
+DEEPEST = 0.020  # [m] below the surface, down to which a point may lie in a groove
 AHEAD = 4  # points of a line to either side that tell which way it leads
 STRETCH = 0.010  # [m] of a line over which the same views are used
 FEWEST_IN_STRETCH = 20  # points near such a stretch that a view must have to cover it
@@ -129,7 +129,8 @@ class Atlas:
         above = rise > GRAZING * np.linalg.norm(sight, axis=1)
         index, nearest, sight = index[above], nearest[above], sight[above] / rise[above, None]
         offset = self.cloud.points[index] - line[nearest]
-        below = np.clip(-np.einsum("ij,ij->i", offset, normals[nearest]), 0.0, DEEPEST)
+        below = -np.einsum("ij,ij->i", offset, normals[nearest])
+        below = np.where((below > 0) & (below < DEEPEST), below, 0.0)
         stretch, left = _places(line, normals, nearest, offset + below[:, None] * sight)
         allowed = _views_by_stretch(self.cloud.viewpoints, view[index], stretch, left, line, normals)
         return index[allowed[view[index], stretch]]

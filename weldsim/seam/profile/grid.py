@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.curves import interpolate
 from weldsim.seam.profile.parent import Parent
 from weldsim.seam.profile.rail import Rail, Strip
 
@@ -22,12 +23,14 @@ class Grid:
     depth: (m, w) mean apparent depth below the parent surface [m], NaN where empty.
     count: (m, w) points in each cell.
     shear: (m,) lateral drift of the sight line for each metre inward.
+    sight: (m, 3) mean direction of the sight lines, in the cloud's frame; straight down where the viewpoint is unknown.
     """
 
     x: Float[ndarray, "w"]
     depth: Float[ndarray, "m w"]
     count: Float[ndarray, "m w"]
     shear: Float[ndarray, "m"]
+    sight: Float[ndarray, "m 3"]
 
     @property
     def sparsity(self) -> float:
@@ -79,9 +82,10 @@ def make_grid(rail: Rail, strip: Strip, parent: Parent, half: float) -> Grid:
     mean = np.divide(total, count, out=np.full(m * width, np.nan), where=count > 0)
     near = np.abs(strip.x) < half
     number = np.bincount(strip.station[near], minlength=m)
-    drift = np.bincount(strip.station[near], weights=strip.slope[near, 1], minlength=m)
+    drift = np.stack([np.bincount(strip.station[near], weights=strip.slope[near, k], minlength=m) for k in (0, 1)], axis=1)
     known = number > 0
-    at = np.arange(m)
-    shear = np.interp(at, at[known], drift[known] / number[known]) if known.any() else np.zeros(m)
+    at = np.arange(m, dtype=float)
+    drift = interpolate(at[known], drift[known] / number[known, None], at) if known.any() else np.zeros((m, 2))
+    sight = drift[:, :1] * rail.t + drift[:, 1:] * rail.e - rail.n
     centres = (np.arange(width) + 0.5) * DX - half
-    return Grid(centres, mean.reshape(m, width), count.reshape(m, width), shear)
+    return Grid(centres, mean.reshape(m, width), count.reshape(m, width), drift[:, 1], sight)

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.curves import resample
+from weldsim.frames import unit
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.grid import Grid, make_grid
 from weldsim.seam.profile.lean import first_section, follow_section, settled_section
@@ -25,6 +26,7 @@ FEWEST_CELLS = 40  # fewer do not fix a cross-section
 MOST_TURNS = 6
 LEVELLING = 2  # turns in which the rail, seen upright at first, is stood on the parent surface
 STEEP = 0.9  # [rad] that the two sides may differ before that
+OTHER_VIEW = 0.08  # [rad] by which the sight turns from one block to the next only from view to view
 QUIETEST = 2e-4  # [m] least standard deviation of a cell: on a wall it depends on where in the cell its points lie
 WIDEST_FOOTPRINT = 1.2  # of the camera's window on a surface seen at 35 deg, over one that faces it
 SETTLED = 2e-4  # [m] a rail that moves less than this is done
@@ -291,6 +293,20 @@ def _first_section(
     return section, offset, seen
 
 
+def _from_one_place(sight: Float[ndarray, "b 3"], candidates: Bool[ndarray, "b"]) -> Bool[ndarray, "b"]:
+    """Those of the blocks that one view shows, the one that shows the most of them.
+
+    Two views differ in blur, in which way it runs, and in where they put the groove; a section that leans, or is wider,
+    can make up for any of that.
+
+    Args:
+        sight: (b, 3) unit, in which direction each is seen.
+    """
+    jump = np.einsum("ij,ij->i", sight[1:], sight[:-1]) < np.cos(OTHER_VIEW)
+    view = np.concatenate([[0], np.cumsum(jump)])
+    return candidates & (view == np.bincount(view, weights=candidates).argmax())
+
+
 def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, float]:
     """The section fitted to blocks of stations, each with its own shear, and its middle's standard deviation [m]."""
     m = len(grid.depth) // BLOCK
@@ -303,6 +319,7 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     inside = np.abs(grid.x) < 0.25 * start.width
     height = (mean * number)[:, inside].sum(axis=1) / np.maximum(number[:, inside].sum(axis=1), 1)
     candidates = flanked[: m * BLOCK].reshape(m, BLOCK).all(axis=1) & (height > 0.25 * start.depth)
+    candidates = _from_one_place(unit(grid.sight[: m * BLOCK].reshape(m, BLOCK, 3).mean(axis=1)), candidates)
     if not candidates.any():
         return start, 0.0
     typical = np.median(height[candidates])
