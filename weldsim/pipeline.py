@@ -63,6 +63,7 @@ def run(
     number: int | None = None,
     near: Sequence[float] | None = None,
     video: "Path | None" = None,
+    black_boxes: "Path | None" = None,
     tell: Tell | None = None,
 ) -> RunResult:
     """The twin scans the scene, plans and welds what it found, and is judged against the scene's known seams.
@@ -71,7 +72,7 @@ def run(
         scene: what stands on the table.  config: everything else.
         seed: of the camera's noise.  sensor: which camera looks.
         number, near: which seam to weld; see `pick`.
-        video: where to write a film of the weld.
+        video: where to write a film of the weld.  black_boxes: folder for what the safety gate leaves behind at a stop.
         tell: told of progress.
     Raises:
         WeldsimError: see the stages; finding no seam is a result, not an error.
@@ -79,7 +80,7 @@ def run(
     config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
     seen = look(scene, config, seed=seed, sensor=sensor, move=config.scan.move, clock=clock)
     result = plan(seen.cloud, config, clock=clock)
-    return finish(seen, result, config, number=number, near=near, video=video, clock=clock)
+    return finish(seen, result, config, number=number, near=near, video=video, black_boxes=black_boxes, clock=clock)
 
 
 def look(
@@ -165,6 +166,7 @@ def finish(
     near: Sequence[float] | None = None,
     execute: bool = True,
     video: "Path | None" = None,
+    black_boxes: "Path | None" = None,
     clock: Clock | None = None,
 ) -> RunResult:
     """What was planned on a sighting, welded by the simulated arm and judged against the scene's known seams.
@@ -173,14 +175,14 @@ def finish(
         seen: where the cloud came from.  result: what was planned on `seen.cloud`.  config: as planned with.
         number, near: which seam; see `pick`.
         execute: whether the arm welds it; without, the plan alone is judged and motion and log are None.
-        video: where to write a film of the weld.  clock: takes the times.
+        video, black_boxes: where to write a film of the weld, and what a stop leaves behind.  clock: takes the times.
     Raises:
         MotionError, ExecutionError: the arm cannot.  InputError: a seam number that there is not.
         PathError: the seam that is meant has no path.
     """
     clock, world = clock or Clock(), seen.world
     welded, path = to_weld(result, number, near)
-    motion, log = _weld(seen, path, config, clock, video) if execute and path is not None else (None, None)
+    motion, log = _weld(seen, path, config, clock, video, black_boxes) if execute and path is not None else (None, None)
     with clock.stage("report"):
         report = weld_report(
             result.findings,
@@ -211,9 +213,10 @@ def finish(
 
 
 def _weld(
-    seen: Sighting, path: TorchPath, config: CellConfig, clock: Clock, video: "Path | None"
+    seen: Sighting, path: TorchPath, config: CellConfig, clock: Clock, video: "Path | None", black_boxes: "Path | None"
 ) -> tuple["MotionPlan", ExecutionLog]:
     """The motion from the last scan view along the path, and what the simulated arm did of it."""
+    from weldsim.execution.gate import SafetyGate
     from weldsim.execution.runner import execute
     from weldsim.execution.simulated import SimulatedRobot
     from weldsim.execution.video import WeldVideo
@@ -229,7 +232,8 @@ def _weld(
         if video is not None:
             film = stack.enter_context(WeldVideo(video))
             simulation = replace(simulation, frame_period=film.frame_period)
-        robot = stack.enter_context(SimulatedRobot(world.model, q_start, simulation, film))
+        arm = SimulatedRobot(world.model, q_start, simulation, film)
+        robot = stack.enter_context(SafetyGate(arm, config.execution.gate, arc=True, folder=black_boxes))
         log = execute(robot, motion.trajectory, config.execution, lambda done: clock.tell("execution", done))
     return motion, log
 

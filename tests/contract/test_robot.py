@@ -9,17 +9,32 @@ from tests.arm_worlds import bare_model
 from tests.torch_paths import START
 from tests.ur_robots import controlled, ur_robot
 from weldsim.errors import ExecutionError
+from weldsim.execution.gate import SafetyGate
 from weldsim.execution.robot import Robot
 from weldsim.execution.simulated import SimulatedRobot
 from weldsim.execution.ur_config import Series
 from weldsim.kinematics import DH, torch_pose
 from weldsim.mounts import PAYLOAD, X_FT
+from weldsim.records import Segment
 
 STILL = np.zeros(6)
+FAST = np.array([1.0, -0.5, 0.5, 1.0, -1.0, 1.0])
+SLOW = np.array([0.2, -0.1, 0.1, 0.3, -0.4, 1.0])  # no gate lets a torch pass 0.25 m/s
 
 
 def simulated() -> Iterator[Callable[[], Robot]]:
     yield lambda: SimulatedRobot(bare_model(), START)
+
+
+def gated() -> Iterator[Callable[[], Robot]]:
+    """The simulated arm behind its gate, told that what comes is a weld: elsewhere no arc would burn."""
+
+    def build() -> Robot:
+        gate = SafetyGate(SimulatedRobot(bare_model(), START), arc=True)
+        gate.label(Segment.WELD, 0.0)
+        return gate
+
+    yield build
 
 
 def real(series: Series) -> Iterator[Callable[[], Robot]]:
@@ -29,7 +44,7 @@ def real(series: Series) -> Iterator[Callable[[], Robot]]:
         yield lambda: ur_robot(host, START)
 
 
-ROBOTS = {"simulated": simulated, "ur-cb3": lambda: real("cb3"), "ur-e": lambda: real("e")}
+ROBOTS = {"simulated": simulated, "gated": gated, "ur-cb3": lambda: real("cb3"), "ur-e": lambda: real("e")}
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -76,7 +91,7 @@ def test_state_is_consistent_and_moves_with_time(robot: Robot) -> None:
 
 def test_servo_returns_what_was_sent_and_gets_there(robot: Robot) -> None:
     with robot:
-        steps = round(0.48 / robot.period)
+        steps = round(0.72 / robot.period)
         for k in range(1, steps + 1):
             u = k / steps
             q = START + 0.05 * (3 * u**2 - 2 * u**3)
@@ -89,12 +104,14 @@ def test_servo_returns_what_was_sent_and_gets_there(robot: Robot) -> None:
 
 def test_stop_drops_the_arc_and_rests_within_300_ms(robot: Robot) -> None:
     with robot:
-        speed = np.array([1.0, -0.5, 0.5, 1.0, -1.0, 1.0])
+        speed, q = SLOW if isinstance(robot, SafetyGate) else FAST, START
         last = round(0.32 / robot.period)
         for k in range(1, last):
             u = min(1.0, k * robot.period / 0.2)
+            u = u**3 * (10 - 15 * u + 6 * u**2)
             robot.set_arc(k > last // 2)
-            robot.servo(robot.state().q + speed * u * robot.period, speed * u)
+            q = q + speed * u * robot.period
+            robot.servo(q, speed * u)
         assert robot.arc
         began = robot.state().t
         robot.stop()

@@ -75,6 +75,7 @@ class Run(ConfigOptions):
                 number=self.seam,
                 near=self.near,
                 video=self.video,
+                black_boxes=folder.with_name(f"{folder.name}.black-box"),
                 tell=tell,
             )
             tell("writing", None)

@@ -51,13 +51,13 @@ def air_moves(
             None if blocked is None else next((t for a, b in pairwise(stops) if (t := touched(a, b, blocked)) is not None), None)
         )
         if found is None:
-            return [air_move(a, b, s, config) for a, b in pairwise(stops)]
+            return [air_move(a, b, s, config, X_FT) for a, b in pairwise(stops)]
         touch = touch or found
     if (
         blocked is not None
         and (corners := roam(*((q_rail, q_home) if back else (q_home, q_rail)), blocked, tries=ROAMS)) is not None
     ):
-        return [air_move(a, b, s, config) for a, b in pairwise(corners)]
+        return [air_move(a, b, s, config, X_FT) for a, b in pairwise(corners)]
     raise LostPathError(f"the air move {'home' if back else 'to the weld'}: {touch}", s=s, reason=f"{touch}")
 
 

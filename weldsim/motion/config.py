@@ -9,6 +9,7 @@ RANGES = {
     "period": (5e-4, 0.1),
     "approach": (0.0, 1.0),
     "lead_speed": (1e-4, 5.0),
+    "air_speed": (1e-4, 5.0),
     "tip_acceleration": (1e-3, 1e3),
     "tip_jerk": (1e-2, 1e6),
     "joint_speed": (1e-3, 10.0),
@@ -40,6 +41,8 @@ class MotionConfig:
     """Straight lead-in along the wire before the weld, and lead-out after it, where the path brings none of its own."""
     lead_speed: MetrePerSecond = 0.10
     """Greatest tip speed on the lead-in and lead-out."""
+    air_speed: MetrePerSecond = 0.24
+    """Greatest tip speed of an air move; the safety gate stops the arm at 0.25 m/s."""
     tip_acceleration: float = 0.5
     """Greatest tip acceleration along any straight or welded piece [m/s2]; 8 mm/s is reached within 0.5 mm."""
     tip_jerk: float = 20.0

@@ -11,13 +11,18 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import MotionError
+from weldsim.frames import Transform
+from weldsim.kinematics import torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import JointPath
 from weldsim.motion.rail import Rail
+from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import Segment
 
 BLOCK = 0.005  # [m] a weld slows down over whole blocks of this length
 RAMPING, BENDING, TWISTING = 0.35, 0.20, 0.45  # shares of a joint's jerk: of ramps, of ramps on bends, of changing bends
+LOOK = 0.01  # [rad] of the leading joint between looks at the tip's speed in the air
+CHORD = 1.001  # the tip's way is longer than chords over so small a turn by less
 HEADROOM = 0.97  # of a joint limit, so that the ramps between blocks stay inside it
 
 
@@ -59,11 +64,16 @@ def _solve(otg: ruckig.Ruckig, request: ruckig.InputParameter, dofs: int, what: 
     return trajectory
 
 
-def air_move(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config: MotionConfig) -> Move:
-    """The quickest straight joint move from q0 to q1 [rad], all joints arriving together; `s` is what it is labelled with."""
+def air_move(
+    q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config: MotionConfig, X_FT: Transform = NOMINAL_X_FT
+) -> Move:
+    """The quickest straight joint move from q0 to q1 [rad], all joints arriving together; `s` is what it is labelled with.
+
+    Its torch tip, X_FT from the flange, keeps to `config.air_speed` where it moves furthest for each joint's radian.
+    """
     request = ruckig.InputParameter(6)
     request.current_position, request.target_position = list(map(float, q0)), list(map(float, q1))
-    request.max_velocity = [min(config.joint_speed, config.joint_speed_limit)] * 6
+    request.max_velocity = [min(config.joint_speed, config.joint_speed_limit, _joint_speed(q0, q1, X_FT, config))] * 6
     request.max_acceleration = [min(config.joint_acceleration, config.joint_acceleration_limit)] * 6
     request.max_jerk = [min(config.joint_jerk, config.joint_jerk_limit)] * 6
     request.synchronization = ruckig.Synchronization.Phase
@@ -73,6 +83,15 @@ def air_move(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config:
     # The last sample, and past the end, ruckig's speed and acceleration are zero only to rounding.
     qd[-1], qdd[-1] = 0.0, 0.0
     return Move(segment=Segment.AIR, q=q, qd=qd, qdd=qdd, s=np.full(n, s), speed=np.zeros(n))
+
+
+def _joint_speed(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig) -> float:
+    """Speed of the leading joint [rad/s] at which the tip is nowhere faster than `config.air_speed` on the straight way."""
+    furthest = float(np.abs(q1 - q0).max())
+    u = np.linspace(0.0, 1.0, max(2, int(np.ceil(furthest / LOOK)) + 1))
+    p = torch_pose(q0 + u[:, None] * (q1 - q0), X_FT).p
+    chord = float(np.linalg.norm(np.diff(p, axis=0), axis=1).max()) * (len(u) - 1)  # [m] a whole way at the greatest rate
+    return config.air_speed * furthest / max(chord * CHORD, 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)

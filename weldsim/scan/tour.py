@@ -65,6 +65,7 @@ def drive(
         ViewError: a view that the arm cannot take.  MotionError: one that it cannot get to; `data`: view, reason.
         ExecutionError, SensorError: the arm or the camera cannot.
     """
+    from weldsim.execution.gate import SafetyGate
     from weldsim.execution.runner import execute
     from weldsim.execution.simulated import SimulatedRobot
     from weldsim.motion.collision import CellCollision
@@ -73,15 +74,15 @@ def drive(
 
     blocked, captures, logs = CellCollision(world.model), [], []
     q = np.array(HOME if blocked(HOME) is None else AWAY, float)
-    robot = SimulatedRobot(world.model, q, execution.simulation)
-    with robot:
-        camera = make_sensor(sensor, twin_scene(world, robot.data), world.intrinsics, tables, seed=seed)
+    arm = SimulatedRobot(world.model, q, execution.simulation)
+    with SafetyGate(arm, execution.gate) as robot:
+        camera = make_sensor(sensor, twin_scene(world, arm.data), world.intrinsics, tables, seed=seed)
         try:
             for view in range(len(world.views)):
                 goal = world.view_joints(view, q)
                 logs.append(execute(robot, way(q, goal, motion, blocked, view), execution))
                 q = robot.state().q
-                stands = world.site_pose(robot.data, "flange") @ world.twin.X_FC
+                stands = world.site_pose(arm.data, "flange") @ world.twin.X_FC
                 capture = camera.capture(View(X_BC=stands, t=robot.state().t))
                 captures.append(replace(capture, frame=replace(capture.frame, X_BC=flange_pose(q) @ X_FC)))
                 tell((view + 1) / len(world.views))

@@ -11,6 +11,7 @@ from tests.arm_worlds import bare_model
 from tests.torch_paths import START, random_path
 from weldsim.errors import ConfigError
 from weldsim.execution.config import SimulationConfig
+from weldsim.execution.gate import SafetyGate
 from weldsim.execution.runner import execute
 from weldsim.execution.simulated import SimulatedRobot
 from weldsim.frames import Transform
@@ -27,9 +28,8 @@ from weldsim.scene.world import build_world
 def test_executed_tip_follows_the_plan(seed: int) -> None:
     path = random_path(seed, ("line", "arc", "wave")[seed])
     plan = plan_motion(path, START)
-    robot = SimulatedRobot(bare_model(), START)
-    with robot:
-        log = execute(robot, plan.trajectory)
+    with SafetyGate(SimulatedRobot(bare_model(), START), arc=True) as gate:
+        log = execute(gate, plan.trajectory)
     weld = log.arc_on
     asked = plan.rail.at(log.s_cmd[weld])
     distance = np.linalg.norm(log.X_BT_act.p[weld] - asked.p, axis=1)

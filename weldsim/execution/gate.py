@@ -1,0 +1,307 @@
+"""The safety gate: a robot around any robot, which lets through what keeps to its rules and stops the arm at what does not.
+
+Nothing is clipped or repaired on the way: a command goes through as it is, or the arc is dropped, the arm brought to rest, and
+`ExecutionError` says which rule, value and limit, when and where on the path.
+"""
+
+import contextlib
+from collections import deque
+from pathlib import Path
+from typing import NoReturn, final
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.errors import ExecutionError, WeldsimError
+from weldsim.execution.black_box import BlackBox, BlackBoxRow
+from weldsim.execution.config import GateConfig
+from weldsim.execution.limits import HISTORY, Breach, motion_breach, off_the_way
+from weldsim.execution.robot import Robot
+from weldsim.frames import Transform
+from weldsim.kinematics import JOINT_NAMES, torch_pose
+from weldsim.mounts import X_FT as NOMINAL_X_FT
+from weldsim.records import Event, JointTrajectory, RobotFacts, RobotState, Segment
+
+
+@final
+class SafetyGate(Robot):
+    """A robot that obeys the rules of `GateConfig`, whatever is asked of it.
+
+    Attributes:
+        inner: the robot behind it.  config: the rules.  arc_permitted: whether the arc may burn at all.
+        black_box: where the last one was written, or None.
+    """
+
+    def __init__(
+        self,
+        inner: Robot,
+        config: GateConfig | None = None,
+        *,
+        arc: bool = False,
+        folder: Path | None = None,
+        X_FT: Transform = NOMINAL_X_FT,
+    ) -> None:
+        """Args: inner, not yet connected; arc, permission to burn; folder, for black boxes, none where None; X_FT, the mount."""
+        if isinstance(inner, SafetyGate):
+            raise ExecutionError(f"{inner.name}: stands behind a gate already", rule="gate")
+        self.inner, self.config, self.arc_permitted = inner, config or GateConfig(), arc
+        self.name, self.period = inner.name, inner.period
+        self.black_box: Path | None = None
+        self._folder, self._X_FT = folder, X_FT
+        self._box = BlackBox(self.config.memory, inner.period, inner.name)
+        self._events: list[Event] = []
+        self._connected, self._asked, self._segment, self._s = False, False, Segment.AIR, 0.0
+        self._forget()
+
+    def _forget(self) -> None:
+        """Before the first command, and after a stop: the arm is at rest, and the next command must be where it stands."""
+        n = max(2, round(self.config.lag / self.period))
+        self._sent: deque[tuple[ndarray, ndarray, ndarray]] = deque(maxlen=HISTORY)  # q, qd, tip
+        self._way: deque[tuple[ndarray, ndarray]] = deque(maxlen=n)  # q, tip
+        self._stamp, self._same, self._lingers = -np.inf, 0, 0
+
+    def connect(self) -> None:
+        self.inner.connect()
+        self._connected = True
+        self._forget()
+
+    def disconnect(self) -> None:
+        self._connected, self._asked = False, False
+        self.inner.disconnect()
+
+    def __enter__(self) -> "SafetyGate":
+        self.connect()
+        return self
+
+    def state(self) -> RobotState:
+        return self.inner.state()
+
+    def facts(self) -> RobotFacts:
+        return self.inner.facts()
+
+    def torque(self) -> Float[ndarray, "6"] | None:
+        return self.inner.torque()
+
+    def events(self) -> tuple[Event, ...]:
+        """The inner robot's, and the gate's own: stops."""
+        self._keep(self.inner.events())
+        happened, self._events = tuple(self._events), []
+        return happened
+
+    @property
+    def arc(self) -> bool:
+        return self.inner.arc
+
+    def label(self, segment: Segment, s: float) -> None:
+        """What the next command belongs to, and its arc length [m]: the arc may burn in WELD alone, errors say where it was."""
+        self._segment, self._s = segment, s
+
+    def set_arc(self, on: bool) -> None:
+        """Raises ExecutionError, at rest, when the arc is asked for without permission or outside WELD."""
+        if on and not self.arc_permitted:
+            self._breach(Breach(rule="arc", what="arc", value=1.0, limit=0.0, text="asked for without permission (--arc)"))
+        if on and self._segment != Segment.WELD:
+            self._breach(self._stray())
+        self._asked = bool(on)
+        self.inner.set_arc(self._asked)
+
+    def check(self, trajectory: JointTrajectory) -> None:
+        """Nothing, when every command of a trajectory, at this robot's period and from here, keeps to the rules.
+
+        Raises:
+            ExecutionError: the first that does not; nothing has moved. `data`: rule, value, limit, t, s.
+        """
+        state = self.inner.state()
+        self._check_start(state, trajectory.q[0])
+        stray = np.flatnonzero(trajectory.arc_on & np.array([segment != Segment.WELD for segment in trajectory.segments]))
+        if len(stray):
+            i = int(stray[0])
+            raise ExecutionError(
+                f"trajectory: the arc is on at {trajectory.t[i]:.3f} s, in {trajectory.segments[i].value};"
+                " it may burn in weld alone",
+                rule="arc",
+                t=float(trajectory.t[i]),
+                s=float(trajectory.s[i]),
+            )
+        rest = np.zeros((HISTORY, 6))
+        q = np.concatenate(
+            [np.repeat(trajectory.q[:1], HISTORY, axis=0), trajectory.q, np.repeat(trajectory.q[-1:], HISTORY, axis=0)]
+        )
+        found = motion_breach(q, np.concatenate([rest, trajectory.qd, rest]), torch_pose(q, self._X_FT).p, self.period, self.config)
+        if found is not None:
+            row, breach = found
+            i = min(row - HISTORY, len(trajectory.t) - 1)
+            t, s = float(trajectory.t[i]), float(trajectory.s[i])
+            raise ExecutionError(
+                f"trajectory: {breach.rule}: {breach.text} at {t:.3f} s, s = {1e3 * s:.1f} mm of the"
+                f" {trajectory.segments[i].value}; nothing has moved, plan it slower or elsewhere",
+                rule=breach.rule,
+                what=breach.what,
+                value=breach.value,
+                limit=breach.limit,
+                t=t,
+                s=s,
+            )
+
+    def servo(self, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> Float[ndarray, "6"]:
+        """What was sent: q itself. Raises ExecutionError, with the arc off and the arm at rest, when a rule is broken."""
+        if not self._connected:
+            raise ExecutionError(f"{self.name}: commanded before connect()", rule="connection")
+        tip = self._before(q, qd)
+        try:
+            sent = self.inner.servo(q, qd)
+        except ExecutionError as error:
+            self._give_up(error)
+            raise
+        self._sent.append((q, qd, tip))
+        self._way.append((q, tip))
+        state = self._reported()
+        self._record(state, q, qd)
+        self._keep(self.inner.events())
+        self._after(state)
+        return sent
+
+    def stop(self) -> None:
+        """Drop the arc, bring the arm to rest, write the black box."""
+        self._stop("stopped on request")
+
+    def _before(self, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> Float[ndarray, "3"]:
+        """The torch tip of a command that keeps to the rules."""
+        if not (np.isfinite(q).all() and np.isfinite(qd).all()):
+            bad = int((~np.isfinite(np.concatenate([q, qd]))).argmax()) % 6
+            text = f"{JOINT_NAMES[bad]} is told a number that is not finite"
+            self._breach(Breach(rule="command", what=JOINT_NAMES[bad], value=float("nan"), limit=0.0, text=text))
+        tip = torch_pose(q, self._X_FT).p
+        if not self._sent:
+            self._check_start(self._reported(), q, moving=True)
+            self._sent.extend([(q, np.zeros(6), tip)] * HISTORY)
+        rows = [*self._sent, (q, qd, tip)]
+        columns = [np.stack(column) for column in zip(*rows, strict=True)]
+        found = motion_breach(columns[0], columns[1], columns[2], self.period, self.config)
+        if found is not None:
+            self._breach(found[1])
+        if self._asked and self._segment != Segment.WELD:
+            self._breach(self._stray())
+        return tip
+
+    def _after(self, state: RobotState) -> None:
+        """Nothing, when the arm is where it was sent lately, what it reports is fresh, and its arc output obeys."""
+        self._same = self._same + 1 if state.t <= self._stamp else 0
+        if state.t < self._stamp:
+            text = f"time stamp went back from {self._stamp:.3f} to {state.t:.3f} s"
+            self._breach(Breach(rule="stale state", what="time stamp", value=state.t, limit=self._stamp, text=text))
+        self._stamp = state.t
+        age = self._same * self.period
+        if age > self.config.stale * (1 + 1e-9):
+            text = f"nothing new from the robot for {age:.3f} s (limit {self.config.stale:g} s)"
+            self._breach(Breach(rule="stale state", what="time stamp", value=age, limit=self.config.stale, text=text))
+        off = np.abs(off_the_way(state.q, np.array([q for q, _ in self._way])))
+        joint = int(off.argmax())
+        if off[joint] > self.config.tracking:
+            text = (
+                f"{JOINT_NAMES[joint]} is {np.rad2deg(off[joint]):.2f} deg off (limit {np.rad2deg(self.config.tracking):.2f} deg)"
+            )
+            self._breach(
+                Breach(rule="tracking", what=JOINT_NAMES[joint], value=float(off[joint]), limit=self.config.tracking, text=text)
+            )
+        if self._segment == Segment.WELD:
+            self._check_tip(state)
+        self._lingers = self._lingers + 1 if self.arc and not self._asked else 0
+        if self._lingers * self.period > self.config.arc_lag * (1 + 1e-9):
+            late = self._lingers * self.period
+            text = f"output still on {late:.3f} s after it was told to go off (limit {self.config.arc_lag:g} s)"
+            self._breach(Breach(rule="arc", what="arc output", value=late, limit=self.config.arc_lag, text=text))
+
+    def _check_tip(self, state: RobotState) -> None:
+        # By our kinematics, as the commands are: a controller's own, calibrated, differ from them by more than an arm strays.
+        tip = torch_pose(state.q, self._X_FT).p
+        off = float(np.linalg.norm(off_the_way(tip, np.array([p for _, p in self._way]))))
+        if off > self.config.tracking_tip:
+            text = f"torch tip is {1e3 * off:.2f} mm off the weld (limit {1e3 * self.config.tracking_tip:.2f} mm)"
+            self._breach(Breach(rule="tracking", what="torch tip", value=off, limit=self.config.tracking_tip, text=text))
+
+    def _check_start(self, state: RobotState, q: Float[ndarray, "6"], moving: bool = False) -> None:
+        away = np.abs(state.q - q)
+        joint, limit = int(away.argmax()), self.config.start_tolerance
+        if away[joint] <= limit:
+            return
+        text = f"{JOINT_NAMES[joint]} stands {np.rad2deg(away[joint]):.2f} deg from the trajectory's first point"
+        text += f" (limit {np.rad2deg(limit):.2f} deg); plan again from where the arm is"
+        breach = Breach(rule="start", what=JOINT_NAMES[joint], value=float(away[joint]), limit=limit, text=text)
+        if moving:
+            self._breach(breach)
+        raise ExecutionError(f"start: {text}", rule="start", what=breach.what, value=breach.value, limit=limit, t=state.t)
+
+    def _stray(self) -> Breach:
+        return Breach(
+            rule="arc", what="arc", value=1.0, limit=0.0, text=f"asked for in {self._segment.value}; it may burn in weld alone"
+        )
+
+    def _reported(self) -> RobotState:
+        """What the robot reports; a report that is none, a joint angle that is no number say, is a breach."""
+        try:
+            return self.inner.state()
+        except ExecutionError as error:
+            self._give_up(error)
+            raise
+        except WeldsimError as error:
+            self._breach(Breach(rule="stale state", what="report", value=float("nan"), limit=0.0, text=str(error)))
+
+    def _give_up(self, error: ExecutionError) -> None:
+        """Stop, write, and add to the inner robot's own error where that was."""
+        self._stop(str(error))
+        error.data.setdefault("s", self._s)
+        error.data.setdefault("segment", self._segment.value)
+        error.data["black_box"] = self.black_box
+
+    def _breach(self, breach: Breach) -> NoReturn:
+        """Stop, write, raise."""
+        t = self._stamp if np.isfinite(self._stamp) else 0.0
+        where = f"at {t:.3f} s, s = {1e3 * self._s:.1f} mm of the {self._segment.value}"
+        message = f"{breach.rule}: {breach.text} {where}; the arc is off and the arm was stopped"
+        self._stop(message)
+        if self.black_box is not None:
+            message += f"; black box: {self.black_box}"
+        raise ExecutionError(
+            message,
+            rule=breach.rule,
+            what=breach.what,
+            value=breach.value,
+            limit=breach.limit,
+            t=t,
+            s=self._s,
+            segment=self._segment.value,
+            black_box=self.black_box,
+        )
+
+    def _stop(self, reason: str) -> None:
+        """The arc off first, then the arm at rest, then the black box; whatever fails of these is told and keeps none of the
+        others from being done."""
+        self._asked = False
+        t = self._stamp if np.isfinite(self._stamp) else 0.0
+        self._keep([Event(t=t, kind="stop", text=reason)])
+        for act, name in ((lambda: self.inner.set_arc(False), "arc off"), (self.inner.stop, "stop")):
+            try:
+                act()
+            except WeldsimError as error:
+                self._keep([Event(t=t, kind="fault", text=f"{name}: {error}")])
+        with contextlib.suppress(WeldsimError):
+            self._keep(self.inner.events())
+            self._record(at_rest := self.inner.state(), at_rest.q, np.zeros(6))
+        self._forget()
+        if self._folder is None:
+            return
+        try:
+            self.black_box = self._box.write(self._folder, reason)
+            self._keep([Event(t=t, kind="black box", text=f"written to {self.black_box}")])
+        except WeldsimError as error:
+            self._keep([Event(t=t, kind="fault", text=f"black box: {error}")])
+
+    def _record(self, state: RobotState, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> None:
+        row = BlackBoxRow(q=q, qd=qd, state=state, arc_asked=self._asked, arc=self.arc, s=self._s, segment=self._segment)
+        self._box.rows.append(row)
+
+    def _keep(self, events: "tuple[Event, ...] | list[Event]") -> None:
+        self._events.extend(events)
+        self._box.events.extend(events)
