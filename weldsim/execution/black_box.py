@@ -1,6 +1,7 @@
 """The black box: the last seconds of commands, reports, arc and events, kept in memory and written out when the arm is stopped."""
 
 import io
+import zipfile
 from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -149,5 +150,5 @@ def read_black_box(path: Path | str) -> BlackBoxRecord:
         return BlackBoxRecord(**alone, **words, events=events, **data)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})", path=str(path)) from error
-    except (ValueError, KeyError, TypeError, EOFError) as error:
+    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: is no black box ({error})", path=str(path)) from error

@@ -59,6 +59,7 @@ class SafetyGate(Robot):
         n = max(2, round(self.config.lag / self.period))
         self._sent: deque[tuple[ndarray, ndarray, ndarray]] = deque(maxlen=HISTORY)  # q, qd, tip
         self._way: deque[tuple[ndarray, ndarray]] = deque(maxlen=n)  # q, tip
+        self._origin: Float[ndarray, "6"] | None = None
         self._stamp, self._same, self._lingers = -np.inf, 0, 0
 
     def connect(self) -> None:
@@ -112,8 +113,7 @@ class SafetyGate(Robot):
         Raises:
             ExecutionError: the first that does not; nothing has moved. `data`: rule, value, limit, t, s.
         """
-        state = self.inner.state()
-        self._check_start(state, trajectory.q[0])
+        self._check_start(self.inner.state(), trajectory.q[0])
         stray = np.flatnonzero(trajectory.arc_on & np.array([segment != Segment.WELD for segment in trajectory.segments]))
         if len(stray):
             i = int(stray[0])
@@ -143,6 +143,11 @@ class SafetyGate(Robot):
                 t=t,
                 s=s,
             )
+
+    def start_from(self, q: Float[ndarray, "6"]) -> None:
+        """The motion that is sent next begins at rest at q [rad], which is not sent itself; without this, at its first command."""
+        self._sent.clear()
+        self._origin = np.array(q)
 
     def servo(self, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> Float[ndarray, "6"]:
         """What was sent: q itself. Raises ExecutionError, with the arc off and the arm at rest, when a rule is broken."""
@@ -174,8 +179,10 @@ class SafetyGate(Robot):
             self._breach(Breach(rule="command", what=JOINT_NAMES[bad], value=float("nan"), limit=0.0, text=text))
         tip = torch_pose(q, self._X_FT).p
         if not self._sent:
-            self._check_start(self._reported(), q, moving=True)
-            self._sent.extend([(q, np.zeros(6), tip)] * HISTORY)
+            origin = q if self._origin is None else self._origin
+            self._check_start(self._reported(), origin, moving=True)
+            self._sent.extend([(origin, np.zeros(6), torch_pose(origin, self._X_FT).p)] * HISTORY)
+            self._origin = None
         rows = [*self._sent, (q, qd, tip)]
         columns = [np.stack(column) for column in zip(*rows, strict=True)]
         found = motion_breach(columns[0], columns[1], columns[2], self.period, self.config)

@@ -87,6 +87,7 @@ def execute(
     robot.check(trajectory)
     trajectory = started_at(trajectory, robot.state().q, config.blend)
     robot.check(trajectory)
+    robot.start_from(trajectory.q[0])
     recorder = _Recorder(robot)
     recorder.add(trajectory.q[0], float(trajectory.s[0]), trajectory.segments[0])
     last = len(trajectory.t) - 1
