@@ -49,10 +49,11 @@ class SafetyGate(Robot):
         self.name, self.period = inner.name, inner.period
         self.black_box: Path | None = None
         self._folder, self._X_FT = folder, X_FT
-        self._box = BlackBox(self.config.memory, inner.period, inner.name)
         self._events: list[Event] = []
         self._connected, self._asked, self._segment, self._s = False, False, Segment.AIR, 0.0
         self._forget()
+
+        self._box = BlackBox(self.config.memory, inner.period, inner.name)
 
     def _forget(self) -> None:
         """Before the first command, and after a stop: the arm is at rest, and the next command must be where it stands."""
@@ -65,6 +66,9 @@ class SafetyGate(Robot):
     def connect(self) -> None:
         self.inner.connect()
         self._connected = True
+        if self.inner.period != self.period:  # which some learn only now
+            self.period = self.inner.period
+            self._box = BlackBox(self.config.memory, self.period, self.name)
         self._forget()
 
     def disconnect(self) -> None:
