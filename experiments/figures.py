@@ -97,6 +97,12 @@ ROWS = {
     "five_offset": Row("cuboid, each of five views off by 3.5 mm rms, worst of 10 seeds: mean", ("mean",), "mm", (2.0e-3,)),
     "tracking": Row("executed torch tip from the plan, p95", ("p95",), "mm", (0.3e-3,)),
     "speed": Row("torch speed from the one asked for, on the weld, max", ("max",), "%", (0.02,)),
+    "exported": Row(
+        "exported URScript on the virtual controller, both profiles, five scenes and the thesis's program: tip from path, max",
+        ("max",),
+        "mm",
+        (0.2e-3,),
+    ),
     "plan_stages": Row("cloud to path, 307,200 points, stages alone, 2 cores", ("seconds",), "s", (0.4,)),
     "plan_process": Row("`weldsim plan` on that cloud, whole process", ("seconds",), "s", (3.0,)),
     "thesis_ratio": Row(

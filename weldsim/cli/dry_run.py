@@ -155,18 +155,14 @@ class DryRunCommand(ConfigOptions):
         from weldsim.execution.urscript import script_text
         from weldsim.output import write_whole
 
-        parts = [
-            script_text(
-                trial.trajectory,
-                title=f"{result.source}, {trial.name}",
-                joint_speed=config.joint_speed,
-                joint_acceleration=config.joint_acceleration,
-                lead_speed=config.lead_speed,
-            )
-            for trial in result.trials
-            if trial.trajectory is not None
-        ]
-        return write_whole(self.export, "\n".join(parts))  # type: ignore[arg-type] - asked for
+        text = script_text(
+            *(trial.trajectory for trial in result.trials if trial.trajectory is not None),
+            title=f"{result.source}, {', '.join(trial.name for trial in result.trials)}",
+            joint_speed=config.joint_speed,
+            joint_acceleration=config.joint_acceleration,
+            lead_speed=config.lead_speed,
+        )
+        return write_whole(self.export, text)  # type: ignore[arg-type] - asked for
 
     def _picture(self, trial: "Trial", cell: "Cell") -> bytes:
         from weldsim.dryrun.picture import picture

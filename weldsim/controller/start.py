@@ -13,20 +13,21 @@ from weldsim.scene.world import HOME, build_world
 
 
 def new_machine(series: Series = "cb3", scene: SceneConfig | None = None, config: ControllerConfig | None = None) -> Machine:
-    """A controller at rest in HOME, powered and with its brakes released.
+    """A controller at rest, powered and with its brakes released; its arm waits where a dry run of the scene has it, else at HOME.
 
     Args:
         series: which profile.  scene: what stands on the table, nothing where None.  config: how it behaves.
     """
     if scene is not None:
-        model = build_world(scene).model
+        world = build_world(scene)
+        model, q = world.model, world.start_joints()
     else:
         keep_quiet()
         spec = new_cell(MaterialConfig())
         add_tool(spec.body("wrist_3_link"))
-        model = spec.compile()
+        model, q = spec.compile(), HOME
     profile = PROFILES[series]
-    return Machine(profile, Arm(model, HOME.tolist(), profile), config)
+    return Machine(profile, Arm(model, q.tolist(), profile), config)
 
 
 def new_server(

@@ -56,17 +56,16 @@ def scene_cell(scene: "SceneConfig", q_start: Float[ndarray, "6"] | None = None)
     Raises:
         SceneError: a scene that contradicts itself.
     """
-    from weldsim.errors import UnreachableError
-    from weldsim.scene.world import AWAY, HOME, build_world
+    from weldsim.scene.world import build_world
 
     world = build_world(scene)
-    collision = CellCollision(world.model)
-    if q_start is None:
-        try:
-            q_start = world.view_joints(len(world.views) - 1)
-        except UnreachableError:
-            q_start = np.array(HOME if collision(HOME) is None else AWAY, float)
-    return Cell(name=scene.name, model=world.model, collision=collision, q_start=q_start, has_part=True)
+    return Cell(
+        name=scene.name,
+        model=world.model,
+        collision=CellCollision(world.model),
+        q_start=world.start_joints() if q_start is None else q_start,
+        has_part=True,
+    )
 
 
 def empty_cell(q_start: Float[ndarray, "6"] | None = None) -> Cell:

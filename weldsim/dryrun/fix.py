@@ -58,7 +58,7 @@ def _slower(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> 
     for _ in range(FULL_TRIES):
         tried = try_path(_with(path, speed=np.minimum(path.speed, speed)), trial.name, cell, config)
         if tried.passed:
-            return (Fix(kind="slower", text=f"weld at {1e3 * speed:.0f} mm/s at most", speed=speed),)
+            return (Fix(kind="slower", text=f"weld at {1e3 * speed:.3g} mm/s at most", speed=speed),)
         speed *= 0.95 * (tried.slowest or 0.5)
     return ()
 

@@ -22,7 +22,6 @@ FINE = 0.001  # [m] to which the first place that fails is found
 FASTEST = 0.25  # [m/s] greatest torch speed with the arc, the safety limit of manual mode
 JUMP = np.deg2rad(2.0)  # [rad] two poses may always differ by so much
 COARSE_ROLLS = 18  # rotations about the wire of a coarse look
-SLOW = 0.99  # share of the asked speed below which a weld is not what was asked for
 
 
 def try_path(path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Trial:
@@ -172,7 +171,7 @@ def _planned(base: Trial, path: TorchPath, plan: MotionPlan, config: MotionConfi
         slowest=plan.slowest,
         trajectory=trajectory,
     )
-    if plan.slowest >= SLOW:
+    if plan.slowest >= config.least_speed:
         return out
     asked = float(path.speed[path.weld].max())
     text = (

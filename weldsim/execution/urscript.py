@@ -1,4 +1,4 @@
-"""A planned weld as URScript: TCP, air moves, lead-in, the weld streamed at the controller's own period, arc output, lead-out.
+"""Planned welds as URScript: TCP, air moves, lead-in, the weld streamed at the controller's own period, arc output, lead-out.
 
 The weld is a stream of servoj targets and not a chain of movep: what a controller makes of blends is its own affair, the
 stream is the checked motion itself. Approach and lead-out are straight lines (movel), air moves straight in the joints (movej).
@@ -17,13 +17,13 @@ from weldsim.records import JointTrajectory, Segment
 
 LOOKAHEAD, GAIN = 0.03, 300  # [s] the least a controller takes, and its own default
 HOLD = 0.2  # [s] that the last target is repeated, until the arm has caught up with it
+NAME = "weldsim_job"
 REST = 1e-6  # [rad/s] below which the arm is at rest
 LEAD_ACCELERATION = 0.5  # [m/s2] of the straight lead-in and lead-out
 
 
 def script_text(
-    trajectory: JointTrajectory,
-    *,
+    *trajectories: JointTrajectory,
     title: str = "weldsim",
     X_FT: Transform = NOMINAL_X_FT,
     arc_output: int = 0,
@@ -31,40 +31,44 @@ def script_text(
     joint_acceleration: float = 1.4,
     lead_speed: float = 0.1,
 ) -> str:
-    """The program, which starts where the trajectory starts and ends where it ends.
+    """One program for all trajectories, in order; each starts where it starts and ends where it ends.
+
+    It is one `def` without a call, which is what a controller's script ports take; a script file of PolyScope needs the call.
 
     Args:
-        trajectory: as planned and checked; at rest where its segments meet.
+        trajectories: as planned and checked, at least one; at rest where their segments meet.
         title: of the program, in a comment.  X_FT: the TCP that is set.
         arc_output: standard digital output that strikes the arc.
         joint_speed, joint_acceleration: of air moves [rad/s], [rad/s2].  lead_speed: of lead-in and lead-out [m/s].
     """
-    q = trajectory.q
-    names = np.array([str(segment) for segment in trajectory.segments])
-    edges = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), len(names)]
     tcp = ", ".join(f"{v:.9f}" for v in (*X_FT.p, *X_FT.rotation_vector))
+    start = ", ".join(f"{v:.1f}" for v in np.rad2deg(trajectories[0].q[0]))
     lines = [
         f"# {' '.join(title.split())}",
-        "# The arm must stand free to reach the first target on a straight joint move.",
-        "def weldsim_job():",
+        "# Checked with the arm starting at the joint angles of the first movej: from anywhere else its way there is not.",
+        f"# They are {start} deg.",
+        f"# Send it to a script port as it is. In a script file of PolyScope, add the line {NAME}() at its end.",
+        f"def {NAME}():",
         f"  set_tcp(p[{tcp}])",
         f"  set_standard_digital_out({arc_output}, False)",
-        f"  movej({_joints(q[0])}, a={joint_acceleration:g}, v={joint_speed:g})",
     ]
-    for first, last in pairwise(edges):
-        # A segment begins at rest where the one before it ended.
-        rows = slice(max(0, first - 1), last)
-        if names[first] == Segment.AIR:
-            lines += [
-                f"  movej({_joints(corner)}, a={joint_acceleration:g}, v={joint_speed:g})" for corner in _corners(trajectory, rows)
-            ]
-        elif names[first] == Segment.WELD:
-            lines += _weld(trajectory, rows, arc_output)
-        else:
-            X_BT = torch_pose(q[last - 1], X_FT)
-            pose = ", ".join(f"{v:.9f}" for v in (*X_BT.p, *X_BT.rotation_vector))
-            lines.append(f"  movel(p[{pose}], a={LEAD_ACCELERATION:g}, v={lead_speed:g})")
-    return "\n".join([*lines, "end", "weldsim_job()", ""])
+    swing = f"a={joint_acceleration:g}, v={joint_speed:g}"
+    for trajectory in trajectories:
+        lines.append(f"  movej({_joints(trajectory.q[0])}, {swing})")
+        names = np.array([str(segment) for segment in trajectory.segments])
+        edges = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), len(names)]
+        for first, last in pairwise(edges):
+            # A segment begins at rest where the one before it ended.
+            rows = slice(max(0, first - 1), last)
+            if names[first] == Segment.AIR:
+                lines += [f"  movej({_joints(corner)}, {swing})" for corner in _corners(trajectory, rows)]
+            elif names[first] == Segment.WELD:
+                lines += _weld(trajectory, rows, arc_output)
+            else:
+                X_BT = torch_pose(trajectory.q[last - 1], X_FT)
+                pose = ", ".join(f"{v:.9f}" for v in (*X_BT.p, *X_BT.rotation_vector))
+                lines.append(f"  movel(p[{pose}], a={LEAD_ACCELERATION:g}, v={lead_speed:g})")
+    return "\n".join([*lines, "end", ""])
 
 
 def _corners(trajectory: JointTrajectory, rows: slice) -> Float[ndarray, "c 6"]:
@@ -77,19 +81,21 @@ def _corners(trajectory: JointTrajectory, rows: slice) -> Float[ndarray, "c 6"]:
 
 
 def _weld(trajectory: JointTrajectory, rows: slice, arc_output: int) -> list[str]:
-    """The stream of targets with the arc switched as the trajectory has it."""
+    """The stream of targets; the arc is switched as the trajectory has it, as late as the arm follows its targets."""
     period = float(trajectory.t[1] - trajectory.t[0])
     tail = f"t={period:g}, lookahead_time={LOOKAHEAD:g}, gain={GAIN})"
-    lines, burning = [], False
-    for q, arc in zip(trajectory.q[rows], trajectory.arc_on[rows], strict=True):
-        if bool(arc) != burning:
-            burning = bool(arc)
-            lines.append(f"  set_standard_digital_out({arc_output}, {burning})")
-        lines.append(f"  servoj({_joints(q)}, {tail}")
-    last = f"  servoj({_joints(trajectory.q[rows][-1])}, {tail}"
-    lines += [last] * int(np.ceil(HOLD / period))
-    lines.append(f"  set_standard_digital_out({arc_output}, False)")
-    return [*lines, "  stopj(2.0)"]
+    hold, lag = int(np.ceil(HOLD / period)), int(np.ceil(LOOKAHEAD / period))
+    q, arc = trajectory.q[rows], trajectory.arc_on[rows]
+    targets = np.concatenate([q, np.repeat(q[-1:], hold, axis=0)])
+    burning = np.concatenate([np.zeros(lag, bool), arc, np.zeros(hold - lag, bool)])
+    lines, was = [], False
+    for target, now in zip(targets, burning, strict=True):
+        if bool(now) != was:
+            was = bool(now)
+            lines.append(f"  set_standard_digital_out({arc_output}, {was})")
+        lines.append(f"  servoj({_joints(target)}, {tail}")
+    # Nothing but to be sure: whatever the stream was, the arc is off before the torch leaves.
+    return [*lines, f"  set_standard_digital_out({arc_output}, False)", "  stopj(2.0)"]
 
 
 def _joints(q: Float[ndarray, "6"]) -> str:

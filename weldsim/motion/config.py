@@ -28,6 +28,7 @@ RANGES = {
     "candidates": (1, 1000),
     "floor": (-2.0, 2.0),
     "clearance": (0.0, 1.0),
+    "least_speed": (0.0, 1.0),
 }
 
 
@@ -80,6 +81,8 @@ class MotionConfig:
     """Height of the table top in the base frame."""
     clearance: Metre = 0.08
     """Distance kept between the arm's centre lines and the table, and between the torch and the arm."""
+    least_speed: float = 0.99
+    """Share of the asked welding speed below which a dry run calls a weld that joint limits make slower a failure."""
     return_home: bool = True
     """Whether the arm goes back to where it started."""
 

@@ -106,6 +106,13 @@ class World:
             position=tuple(X_BF.p),
         )
 
+    def start_joints(self) -> Float[ndarray, "6"]:
+        """Where the arm waits for its job [rad]: with the camera at the last view, or at HOME or AWAY where it cannot be."""
+        try:
+            return self.view_joints(len(self.views) - 1)
+        except UnreachableError:
+            return np.array(HOME if self.new_data(HOME).ncon == 0 else AWAY, float)
+
     def _part_in_sight(self, data: Any) -> bool:
         """Whether no ray from the wrist camera to the part's outline or middle meets the robot."""
         eye = data.camera("d415").xpos
