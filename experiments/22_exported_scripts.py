@@ -220,6 +220,7 @@ SHOWN = {
     "missed": "missed mm",
     "speed": "speed p99 %",
     "speed_max": "max %",
+    "steady": "steady %",
     "start": "arc on mm",
     "end": "arc off mm",
     "length": "length mm",

@@ -45,12 +45,19 @@ def _add_torch(tool: Body) -> None:
     draw_box("torch_clamp", (0.0, -0.020, 0.040), (0.026, 0.024, 0.012), "steel")
     draw_rod("tool_plate", (0.0, 0.0, 0.0), (0.0, 0.0, 0.012), 0.0375, "ur_aluminium")
     draw_box("torch_post", (0.0, -0.008, 0.021), (0.022, 0.020, 0.010), "steel")
+    # The nozzle's mouth has a rim and is a cylinder: a capsule's round end would leave it out. The wire alone may touch.
+    hit_rod, hit_box = (partial(draw, tool, material="collision", group=Group.COLLISION, collide=True) for draw in (rod, box))
+    hit_rod("nozzle_mouth_collision", along(STICK_OUT), along(0.045), 0.0085)
     for name, a, b, radius in (
         ("nozzle_collision", along(STICK_OUT + 0.011), along(0.093), 0.011),
-        ("neck_collision", along(0.090), (0.0, -0.026, 0.085), 0.014),
+        ("insulator_collision", along(0.085), along(0.091), 0.0122),
+        *((f"neck_{i}_collision", a, b, 0.0095) for i, (a, b) in enumerate(pairwise(bend))),
         ("torch_collision", (0.0, -0.024, 0.085), (0.0, -0.018, 0.025), 0.024),
     ):
-        rod(tool, name, a, b, radius, "collision", group=Group.COLLISION, collide=True, round_ends=True)
+        hit_rod(name, a, b, radius, round_ends=True)
+    hit_rod("tool_plate_collision", (0.0, 0.0, 0.0), (0.0, 0.0, 0.012), 0.0375)
+    hit_box("torch_clamp_collision", (0.0, -0.020, 0.040), (0.026, 0.024, 0.012))
+    hit_box("torch_post_collision", (0.0, -0.008, 0.021), (0.022, 0.020, 0.010))
     tool.add_site(name="torch_tip", pos=X_FT.p, quat=X_FT.quaternion, size=[0.002, 0.002, 0.002], group=4)
 
 
@@ -70,7 +77,7 @@ def _add_camera(tool: Body, intrinsics: CameraIntrinsics) -> None:
         draw_rod(f"d415_lens_{i}", at(x, 0, -0.0013), at(x, 0, -0.0010), radius, "lens")
     draw_box("d415_back", at(0.020, 0.0, -0.0235), (0.024, 0.009, 0.002), "bracket")
     _bracket(tool, np.array([0.0, -0.030, 0.006]), at(0.020, 0.0, -0.024))
-    box(tool, "d415_collision", at(0.020, 0.0, -0.0125), (0.0515, 0.0135, 0.0115), "collision", group=Group.COLLISION, collide=True)
+    box(tool, "d415_collision", at(0.020, 0.0, -0.0125), (0.0515, 0.0135, 0.0130), "collision", group=Group.COLLISION, collide=True)
     camera(tool, "d415", X_FC, intrinsics)
 
 
@@ -83,6 +90,9 @@ def _bracket(tool: Body, start: np.ndarray, end: np.ndarray) -> None:
     draw_box = partial(box, tool, group=Group.ROBOT)
     geom = draw_box("bracket_arm", arm.p, (length / 2 + 0.008, 0.016, 0.004), "bracket")
     geom.quat = arm.quaternion
-    draw_box("bracket_post", (foot + end) / 2, (0.016, 0.004, float(end[2] - foot[2]) / 2 + 0.002), "bracket")
-    geom = box(tool, "bracket_collision", arm.p, (length / 2, 0.016, 0.005), "collision", group=Group.COLLISION, collide=True)
+    post = (foot + end) / 2, (0.016, 0.004, float(end[2] - foot[2]) / 2 + 0.002)
+    draw_box("bracket_post", *post, "bracket")
+    hit_box = partial(box, tool, material="collision", group=Group.COLLISION, collide=True)
+    geom = hit_box("bracket_collision", arm.p, (length / 2 + 0.008, 0.016, 0.005))
     geom.quat = arm.quaternion
+    hit_box("bracket_post_collision", *post)
