@@ -25,10 +25,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from weldsim.cli import main as weldsim
 from weldsim.controller.packet import Packet, PacketReader, PacketType, unpack_values
 from weldsim.controller.ports import REALTIME, RTDE
+
+from weldsim.cli import main as run_command
 from weldsim.curves import arc_length, project
 from weldsim.dryrun.read import read_program
 from weldsim.frames import Transform
@@ -181,9 +181,9 @@ def exported(name: str, folder: Path) -> tuple[Path, TorchPath] | str:
         source, around = Path(data) / "real" / "thesis_paths" / "ur_y_shape.csv", ["--empty"]
     else:
         source, around = folder / name / "path.json", ["--scene", name]
-        if weldsim(["run", name, "--out", str(folder / name), "--json"]) > 1:
+        if run_command(["run", name, "--out", str(folder / name), "--json"]) > 1:
             return "no path was planned"
-    if weldsim(["dry-run", str(source), *around, "--no-fix", "--export", str(script), "--set", SLOW_CORNERS, "--json"]) != 0:
+    if run_command(["dry-run", str(source), *around, "--no-fix", "--export", str(script), "--set", SLOW_CORNERS, "--json"]) != 0:
         return "the dry run fails"
     return script, read_program(source).paths[0]
 

@@ -110,7 +110,7 @@ class World:
         """Where the arm waits for its job [rad]: with the camera at the last view, or at HOME or AWAY where it cannot be."""
         try:
             return self.view_joints(len(self.views) - 1)
-        except UnreachableError:
+        except ViewError:
             return np.array(HOME if self.new_data(HOME).ncon == 0 else AWAY, float)
 
     def _part_in_sight(self, data: Any) -> bool:
