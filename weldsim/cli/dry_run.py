@@ -158,7 +158,6 @@ class DryRunCommand(ConfigOptions):
         text = script_text(
             *(trial.trajectory for trial in result.trials if trial.trajectory is not None),
             title=f"{result.source}, {', '.join(trial.name for trial in result.trials)}",
-            joint_speed=config.joint_speed,
             joint_acceleration=config.joint_acceleration,
             lead_speed=config.lead_speed,
         )

@@ -18,7 +18,8 @@ from weldsim.records import JointTrajectory, Segment
 LOOKAHEAD, GAIN = 0.03, 300  # [s] the least a controller takes, and its own default
 HOLD = 0.2  # [s] that the last target is repeated, until the arm has caught up with it
 NAME = "weldsim_job"
-REST = 1e-6  # [rad/s] below which the arm is at rest
+FIRST_SPEED = 0.2  # [rad/s] of the leading joint, to where the program starts: the torch stays below 0.25 m/s however far it is
+REST, STAYED = 1e-6, 1e-6  # [rad/s] below which the arm is at rest, [rad] by which it has not moved
 LEAD_ACCELERATION = 0.5  # [m/s2] of the straight lead-in and lead-out
 
 
@@ -27,7 +28,6 @@ def script_text(
     title: str = "weldsim",
     X_FT: Transform = NOMINAL_X_FT,
     arc_output: int = 0,
-    joint_speed: float = 1.05,
     joint_acceleration: float = 1.4,
     lead_speed: float = 0.1,
 ) -> str:
@@ -39,7 +39,7 @@ def script_text(
         trajectories: as planned and checked, at least one; at rest where their segments meet.
         title: of the program, in a comment.  X_FT: the TCP that is set.
         arc_output: standard digital output that strikes the arc.
-        joint_speed, joint_acceleration: of air moves [rad/s], [rad/s2].  lead_speed: of lead-in and lead-out [m/s].
+        joint_acceleration: of air moves [rad/s2], which are as fast as planned.  lead_speed: of lead-in and lead-out [m/s].
     """
     tcp = ", ".join(f"{v:.9f}" for v in (*X_FT.p, *X_FT.rotation_vector))
     start = ", ".join(f"{v:.1f}" for v in np.rad2deg(trajectories[0].q[0]))
@@ -52,16 +52,18 @@ def script_text(
         f"  set_tcp(p[{tcp}])",
         f"  set_standard_digital_out({arc_output}, False)",
     ]
-    swing = f"a={joint_acceleration:g}, v={joint_speed:g}"
     for trajectory in trajectories:
-        lines.append(f"  movej({_joints(trajectory.q[0])}, {swing})")
+        lines.append(f"  movej({_joints(trajectory.q[0])}, a={joint_acceleration:g}, v={FIRST_SPEED:g})")
         names = np.array([str(segment) for segment in trajectory.segments])
         edges = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), len(names)]
         for first, last in pairwise(edges):
             # A segment begins at rest where the one before it ended.
             rows = slice(max(0, first - 1), last)
             if names[first] == Segment.AIR:
-                lines += [f"  movej({_joints(corner)}, {swing})" for corner in _corners(trajectory, rows)]
+                lines += [
+                    f"  movej({_joints(corner)}, a={joint_acceleration:g}, v={speed:.6f})"
+                    for corner, speed in _swings(trajectory, rows)
+                ]
             elif names[first] == Segment.WELD:
                 lines += _weld(trajectory, rows, arc_output)
             else:
@@ -71,13 +73,15 @@ def script_text(
     return "\n".join([*lines, "end", ""])
 
 
-def _corners(trajectory: JointTrajectory, rows: slice) -> Float[ndarray, "c 6"]:
-    """Where an air move comes to rest: the ends of its straight pieces, but for the first."""
-    rest = np.abs(trajectory.qd[rows]).max(axis=1) < REST
-    q = trajectory.q[rows]
-    at = [i for i in np.flatnonzero(rest) if i > 0 and np.abs(q[i] - q[0]).max() > 1e-6]
-    kept = [i for k, i in enumerate(at) if k + 1 == len(at) or np.abs(q[at[k + 1]] - q[i]).max() > 1e-6]
-    return q[kept] if kept else q[-1:]
+def _swings(trajectory: JointTrajectory, rows: slice) -> list[tuple[Float[ndarray, "6"], float]]:
+    """Where an air move comes to rest, but for its beginning, and the leading joint's greatest speed on the way there [rad/s]."""
+    q, qd = trajectory.q[rows], np.abs(trajectory.qd[rows]).max(axis=1)
+    out, last = [], 0
+    for i in np.flatnonzero(qd < REST):
+        if i > 0 and np.abs(q[i] - q[last]).max() > STAYED:
+            out.append((q[i], float(qd[last : i + 1].max())))
+            last = int(i)
+    return out or [(q[-1], FIRST_SPEED)]
 
 
 def _weld(trajectory: JointTrajectory, rows: slice, arc_output: int) -> list[str]:

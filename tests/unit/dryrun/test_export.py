@@ -1,5 +1,7 @@
 """The exported program is read back by the dry run, passes, and takes the torch along the path."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from tests.torch_paths import START, flat_curve, torch_path
@@ -33,8 +35,22 @@ def test_the_exported_program_follows_the_path(tmp_path):
     # Constant speed: as long as the planned weld, to the ramps and the holding of the last target.
     welding = sum(motion.t for motion in program.motions if motion.arc)
     assert abs(welding - trial.trajectory.arc_on.sum() * 0.008) < 0.25
+    # Air moves are as slow as the plan has them: the torch's tip keeps below what it may.
+    swings = [motion for motion in program.motions if motion.command == "movej"]
+    assert len(swings) > 2
+    for before, motion in pairwise(swings):
+        q = before.q + np.linspace(0, 1, 200)[:, None] * (motion.q - before.q)
+        longest = np.abs(motion.q - before.q).max()
+        if longest > 1e-6:
+            assert _tip_speed(q, longest / motion.speed / 199) < 1.01 * MotionConfig().air_speed
     assert np.abs(again.q[-1] - START).max() < 1e-6
     assert not program.motions[-1].arc
+
+
+def _tip_speed(q: np.ndarray, period: float) -> float:
+    """Greatest speed of the torch tip [m/s] where neighbouring samples are neighbours in time too."""
+    steps = np.linalg.norm(np.diff(torch_pose(q).p, axis=0), axis=1)
+    return float(steps[np.abs(np.diff(q, axis=0)).max(axis=1) < 0.05].max()) / period
 
 
 def test_the_reach_map_is_what_the_arm_can_do():
