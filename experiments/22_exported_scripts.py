@@ -25,12 +25,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from weldsim.controller.packet import Packet, PacketReader, PacketType, unpack_values
-from weldsim.controller.ports import REALTIME, RTDE
 
 from weldsim.cli import main as run_command
 from weldsim.curves import arc_length, project
 from weldsim.dryrun.read import read_program
+from weldsim.execution.rtde_packet import Packet, PacketReader, PacketType, unpack_values
+from weldsim.execution.ur_ports import REALTIME, RTDE
 from weldsim.frames import Transform
 from weldsim.kinematics import torch_pose
 from weldsim.output import write_whole
