@@ -26,6 +26,7 @@ from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit
 from weldsim.seam.profile.track import deepest
 from weldsim.seam.profile.valley import CoarseLine
+from weldsim.seam.profile.window import at_one_window
 
 LONG = 0.05  # [m] a seam of this length is half as good as the same one without end
 MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
@@ -86,7 +87,8 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
     joined = join_pieces(found, atlas, config)
     whole = _without_doubles([piece for piece in joined if piece.whole])
     carried = _without_doubles([carry_on(piece, atlas, config) for piece in whole])
-    return _without_doubles(part_at_branches(carried, atlas, config)), rejected
+    parted = _without_doubles(part_at_branches(carried, atlas, config))
+    return at_one_window(parted, atlas.cloud.viewpoints, config), rejected
 
 
 def _without_doubles(pieces: list[Piece]) -> list[Piece]:

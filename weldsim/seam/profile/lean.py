@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.seam.profile.section import Section
-from weldsim.seam.profile.shape import HIGH, LEAN, LOW, UNIT, Solution, predict, section_of, solve, terms, unknowns
+from weldsim.seam.profile.shape import BLUR, HIGH, LEAN, LOW, UNIT, Solution, predict, section_of, solve, terms, unknowns
 from weldsim.seam.profile.views import Blocks, Views, gather
 
 LEANS = (-1.0, -0.7, -0.4, -0.15, 0.15, 0.4, 0.7, 1.0)  # of the most that leaves no wall overhanging
@@ -20,6 +20,7 @@ FEW_LEANS = (0.0, -0.6, 0.6)  # looked at first
 WORTH_A_LOOK = 2.0  # log likelihood ratio of the best lean there from which all are looked at
 LEAN_SCORE = 4.5  # standard deviations by which a lean must stand out: most grooves are symmetric
 FIRST_STARTS = ((4e-4, 0.1), (5e-3, 0.1), (4e-4, 0.7), (8e-3, 0.3))  # blur [m], floor: one may stand in for the other
+STOCKY, FLOORS = (0.8, 1.0, 1.3), (0.05, 0.5)  # how much wider and less deep, and with which floor, another section begins
 SYMMETRIC_ODDS = 5.0  # how much likelier a groove is symmetric than leaning, for the doubt: it weighs leans that go unseen
 UNNOTICED = 0.02  # of the width: the lean of a groove that counts as symmetric
 BIN = 0.0035  # [m] across the seam, over which what no section can fit is alike
@@ -64,6 +65,24 @@ def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Secti
     unnoticed = float(mass[lean == 0.0].sum()) * (2 * UNNOTICED * exchange) ** 2
     variance = between + unnoticed + _variance(last, views, blocks, start.step)
     return section_of(last.theta, start.step), float(min(np.sqrt(variance), MOST_DOUBT * last.theta[1]))
+
+
+def section_at_blur(blocks: Blocks, start: Section, noise: float, blur: float) -> Section:
+    """The section of `start`'s lean that fits blocks of a strip under a window `blur` [m] wide.
+
+    Args:
+        noise: the least standard deviation of a cell [m].
+    """
+    views, base = gather(blocks, start.depth, noise), unknowns(start)
+    base[BLUR] = blur
+    starts = np.repeat(base[None], len(STOCKY) * len(FLOORS), axis=0)
+    wider = np.repeat(STOCKY, len(FLOORS))
+    starts[:, 1] *= wider
+    starts[:, 2] /= wider
+    starts[:, 3] = np.tile(FLOORS, len(STOCKY))
+    free = _all_but_lean()
+    free[BLUR] = False
+    return section_of(min(solve(starts, free, views, blocks.x, start.step), key=lambda each: each.cost).theta, start.step)
 
 
 def _all_but_lean() -> Bool[ndarray, "7"]:

@@ -308,7 +308,22 @@ def _from_one_place(sight: Float[ndarray, "b 3"], candidates: Bool[ndarray, "b"]
 
 
 def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, float]:
-    """The section fitted to blocks of stations, each with its own shear, and its middle's standard deviation [m]."""
+    """The section fitted to blocks of stations, and its middle's standard deviation [m]."""
+    blocks = mean_blocks(grid, flanked, start)
+    if blocks is None:
+        return start, 0.0
+    least = max(noise, QUIETEST)
+    if stage == "settled":
+        return settled_section(blocks, start, least)
+    return (first_section if stage == "first" else follow_section)(blocks, start, least), 0.0
+
+
+def mean_blocks(grid: Grid, flanked: Bool[ndarray, "m"], start: Section) -> Blocks | None:
+    """Blocks of stations that shape a section about as large as `start`, each with its own shear; None where they are too few.
+
+    Args:
+        flanked: (m,) stations with parent surface on both sides.
+    """
     m = len(grid.depth) // BLOCK
     use = grid.depth[: m * BLOCK].reshape(m, BLOCK, -1)
     known = np.isfinite(use)
@@ -321,13 +336,9 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     candidates = flanked[: m * BLOCK].reshape(m, BLOCK).all(axis=1) & (height > 0.25 * start.depth)
     candidates = _from_one_place(unit(grid.sight[: m * BLOCK].reshape(m, BLOCK, 3).mean(axis=1)), candidates)
     if not candidates.any():
-        return start, 0.0
+        return None
     typical = np.median(height[candidates])
     keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
     if not keep.any() or np.count_nonzero(number[keep]) < FEWEST_CELLS:
-        return start, 0.0
-    blocks = Blocks(grid.x, mean[keep], number[keep].astype(float), shear[keep], BLOCK)
-    least = max(noise, QUIETEST)
-    if stage == "settled":
-        return settled_section(blocks, start, least)
-    return (first_section if stage == "first" else follow_section)(blocks, start, least), 0.0
+        return None
+    return Blocks(grid.x, mean[keep], number[keep].astype(float), shear[keep], BLOCK)
