@@ -64,6 +64,20 @@ def test_a_groove_over_three_faces_is_one_seam(seed: int, known: bool) -> None:
     assert (np.diff(s) > 0).all() or (np.diff(s) < 0).all()
 
 
+@pytest.mark.parametrize("slope", [-0.5, 0.5])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_view_that_ends_aslant_across_the_groove_leaves_no_gap(seed: int, slope: float) -> None:
+    """The next view takes over where both plates and the groove between them are in it; that looks aslant along the groove."""
+    rng = np.random.default_rng(seed)
+    cloud, X = box(rng, 3e-4)
+    assert cloud.view is not None
+    local = X.inverse().points(cloud.points)
+    lost = (cloud.view == 0) & (local[:, 2] > HEIGHT - rng.uniform(0.05, 0.08) + slope * local[:, 1])
+    (seam,) = find_seams_profile(cloud.select(~lost), CONFIG).seams
+    assert seam.gaps == ()
+    assert seam.length > LENGTH + 2 * HEIGHT - 0.03
+
+
 def test_each_view_has_a_chart_of_its_own_points() -> None:
     cloud, _ = box(np.random.default_rng(0), 0.0)
     atlas = make_atlas(cloud)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weldsim.seam.profile.lean import first_section, settled_section
+from weldsim.seam.profile.lean import first_section, section_at_blur, settled_section
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.views import Blocks
 
@@ -138,3 +138,28 @@ def test_a_lean_that_noise_hides_is_doubted() -> None:
         scores.append(abs(found.middle - truth.middle) / sigma)
     assert np.median(scores) < 3
     assert max(scores) < 5
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("shear", [-0.35, 0.35])
+def test_a_lean_that_a_slanted_look_may_make_up_has_to_stand_out(shear: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for lean, noise, few in ((0.0022, 8e-4, 12), (0.0055, 1e-4, 24)):
+        truth = section(lean=-np.sign(shear) * lean, blur=0.004)
+        blocks = blocks_of(truth, np.full(few, shear), noise, rng)
+        found, sigma = settled_section(blocks, first_section(blocks, section(), 5e-5), 5e-5)
+        clear = noise < 2e-4
+        assert (abs(found.lean) > 0.5 * lean) == clear
+        assert abs(found.middle - truth.middle) < max(3 * sigma, 1e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_at_the_right_blur_a_groove_taken_for_a_narrower_deeper_one_gets_its_size_back(seed: int) -> None:
+    rng = np.random.default_rng([seed, 11])
+    truth = section(width=rng.uniform(0.010, 0.020), depth=rng.uniform(0.006, 0.010), blur=0.007)
+    blocks = blocks_of(truth, rng.uniform(-0.1, 0.1, 16), 2e-4, rng)
+    mistaken = replace(truth, width=0.7 * truth.width, depth=1.4 * truth.depth, blur=0.009)
+    found = section_at_blur(blocks, mistaken, 5e-5, truth.blur)
+    assert found.blur == truth.blur
+    assert found.width == pytest.approx(truth.width, rel=0.05)
+    assert abs(found.depth / truth.depth - 1) < 0.15, "a floor makes up for some of it"

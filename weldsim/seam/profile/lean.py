@@ -21,6 +21,10 @@ WORTH_A_LOOK = 2.0  # log likelihood ratio of the best lean there from which all
 LEAN_SCORE = 4.5  # standard deviations by which a lean must stand out: most grooves are symmetric
 FIRST_STARTS = ((4e-4, 0.1), (5e-3, 0.1), (4e-4, 0.7), (8e-3, 0.3))  # blur [m], floor: one may stand in for the other
 STOCKY, FLOORS = (0.8, 1.0, 1.3), (0.05, 0.5)  # how much wider and less deep, and with which floor, another section begins
+# A stereo matcher follows the wall that faces it rather than the other one: the reference camera shows the bottom of a
+# symmetric V displaced twice as far as the sight lines do that.
+SLANT = 1.5  # of that displacement, within which a lean the same way has to stand out by
+SLANT_SCORE = 9.0  # standard deviations; until then it counts in the doubt
 SYMMETRIC_ODDS = 5.0  # how much likelier a groove is symmetric than leaning, for the doubt: it weighs leans that go unseen
 UNNOTICED = 0.02  # of the width: the lean of a groove that counts as symmetric
 BIN = 0.0035  # [m] across the seam, over which what no section can fit is alike
@@ -45,7 +49,7 @@ def first_section(blocks: Blocks, start: Section, noise: float) -> Section:
     found = solve(_picked(rough, len(FIRST_STARTS), 2), _all_but_lean(), views, blocks.x, start.step)
     symmetric, leaning = (min(part, key=lambda each: each.cost) for part in (found[:2], found[2:]))
     free = solve(leaning.theta[None], np.ones(7, bool), views, blocks.x, start.step)[0]
-    insists = _gain(symmetric, free, views, blocks, start.step) > LEAN_SCORE**2 / 2
+    insists = _insists(_gain(symmetric, free, views, blocks, start.step), free, blocks)
     return section_of((free if insists else symmetric).theta, start.step)
 
 
@@ -126,7 +130,14 @@ def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: f
         gain = _gain(symmetric, free, views, blocks, step)
     if abs(free.theta[LEAN]) > 1e-3:
         found.append(free)
-    return found, gain > LEAN_SCORE**2 / 2
+    return found, _insists(gain, free, blocks)
+
+
+def _insists(gain: float, leaning: Solution, blocks: Blocks) -> bool:
+    """Whether the data insist on a lean, the more so on one that a slanted look at a symmetric groove may have made up."""
+    shape, drift = section_of(leaning.theta, 0.0), float(np.median(blocks.shear))
+    made_up = shape.lean * drift < 0 and abs(shape.lean) < SLANT * shape.depth * abs(drift)
+    return gain > (SLANT_SCORE if made_up else LEAN_SCORE) ** 2 / 2
 
 
 def _freed(found: list[Solution], views: Views, blocks: Blocks, step: float) -> Solution:
