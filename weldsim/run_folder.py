@@ -4,6 +4,7 @@ import io
 import json
 import os
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,11 +56,20 @@ def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "Scene
     Raises:
         OutputError: it cannot be written; nothing is left then.
     """
+    return folder_in_place(folder, lambda place: _fill(place, result, config, scene, seed, sensor))
+
+
+def folder_in_place(folder: Path, fill: Callable[[Path], None]) -> Path:
+    """`folder`, with what `fill` writes into a folder beside it that is then renamed; an earlier run there is replaced.
+
+    Raises:
+        OutputError: it cannot be written, or holds something other than a run; nothing is left then.
+    """
     check_run_folder(folder)
     temporary = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     try:
         temporary.mkdir(parents=True)
-        _fill(temporary, result, config, scene, seed, sensor)
+        fill(temporary)
         _put_in_place(temporary, folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error.strerror or error})", path=str(folder)) from error
@@ -71,7 +81,7 @@ def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "Scene
 def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: SensorName) -> None:
     plan, report = result.plan, result.report
     resolved = {"cell": to_json(config), "scene": to_json(scene), "seed": seed, "sensor": sensor}
-    _write_json(folder / "config.json", resolved)
+    write_json(folder / "config.json", resolved)
     source = {"scene": scene.name, "seed": seed, "sensor": sensor, "points": len(plan.cloud), "method": plan.findings.method}
     reasons = {index: str(error) for index, error in plan.refused.items()}
     document = path_document(plan.findings.seams, plan.paths, report.timing, source, plan.config_digest, refused=reasons)
@@ -84,9 +94,9 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     if result.tour is not None:
         write_whole(folder / "scan.npz", tour_bytes(result.tour.logs))
     if result.registration is not None:
-        _write_json(folder / "views.json", views_document(result.registration))
+        write_json(folder / "views.json", views_document(result.registration))
     limits = limits_for(config, scene)
-    _write_json(folder / "report.json", report_json(report, limits))
+    write_json(folder / "report.json", report_json(report, limits))
     seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": limits}
     write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, **seen)
     write_png(folder / "report.png", report, plan.cloud, plan.findings, plan.paths, **seen)
@@ -103,7 +113,7 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
         "versions": report.versions,
         "files": sorted(path.name for path in folder.iterdir()),
     }
-    _write_json(folder / MANIFEST, manifest)
+    write_json(folder / MANIFEST, manifest)
 
 
 def views_document(found: Registration) -> dict[str, Any]:
@@ -157,5 +167,6 @@ def _is_run(folder: Path) -> bool:
         return False
 
 
-def _write_json(path: Path, content: dict[str, Any]) -> None:
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Nothing; the file is written whole, readable, without numbers that JSON has not."""
     write_whole(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")

@@ -169,22 +169,18 @@ class DryRunCommand(ConfigOptions):
         return picture(trial, cell)
 
     def _print(self, result: "DryRun", written: list[Path], trouble: str) -> None:
-        from weldsim.dryrun.verdict import runs
-
         word = f"would pass, cycle time {result.cycle:.1f} s" if result.passed else "WOULD FAIL"
         print(f"{result.source} in the cell {result.cell}: {word}")
         for note in result.notes:
             print(f"  {note}")
         for trial, fixes in zip(result.trials, result.fixes, strict=True):
-            bad = [(a, b) for a, b in runs(trial.verdicts) if not a.ok]
             state = f"{trial.cycle:.1f} s" if trial.passed else "fails"
             print(f"  {trial.name}: {len(trial.verdicts)} waypoints, {units.to_mm(trial.length):.0f} mm, {state}")
-            rows = [_row(a, b) for a, b in bad[:TOLD]]
-            if rows:
+            if rows := failures(trial):
                 print(table(rows, ("waypoint", "s", "verdict", "reason")))
             for fix in fixes:
                 print(f"  would pass: {fix.text}")
-            if bad and not fixes and not self.no_fix:
+            if rows and not fixes and not self.no_fix:
                 print("  no change that was tried would help")
             for note in trial.notes:
                 print(f"  {note}")
@@ -192,6 +188,14 @@ class DryRunCommand(ConfigOptions):
             print(f"  {trouble}")
         for path in written:
             print(f"  wrote {path}")
+
+
+def failures(trial: "Trial") -> list[list[str]]:
+    """Lines of a table of what failed, TOLD of them at most."""
+    from weldsim.dryrun.verdict import runs
+
+    bad = [(a, b) for a, b in runs(trial.verdicts) if not a.ok]
+    return [_row(a, b) for a, b in bad[:TOLD]]
 
 
 def _row(first: "Verdict", last: "Verdict") -> list[str]:

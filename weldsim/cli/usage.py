@@ -11,6 +11,7 @@ import tyro
 from weldsim.cli.controller import Controller
 from weldsim.cli.doctor import Doctor
 from weldsim.cli.dry_run import DryRunCommand
+from weldsim.cli.execute import Execute
 from weldsim.cli.plan import Plan
 from weldsim.cli.regress import Regress
 from weldsim.cli.run import Run
@@ -23,6 +24,7 @@ COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
     "run": Run,
     "scan": Scan,
     "dry-run": DryRunCommand,
+    "execute": Execute,
     "scenes": Scenes,
     "regress": Regress,
     "controller": Controller,

@@ -48,6 +48,12 @@ def read_program(
         paths = torch_paths(document, speed=speed)
         if not paths:
             raise InputError(f"{path}: holds no seam with poses; there is nothing to check", path=str(path))
+        for each, seam in zip(paths, document["seams"], strict=True):
+            far = float(np.linalg.norm(each.X_BT.p, axis=1).max())
+            if far > FURTHEST:
+                raise InputError(
+                    f"{path}: {seam['id']}: {far:.4g} m from the base (limit {FURTHEST:g} m): looks like millimetres", value=far
+                )
         if roll_free is not None:
             paths = tuple(_with_roll(each, roll_free) for each in paths)
         return Program(source=path.name, kind="path", paths=paths, names=tuple(seam["id"] for seam in document["seams"]))

@@ -4,7 +4,6 @@ Nothing is clipped or repaired on the way: a command goes through as it is, or t
 `ExecutionError` says which rule, value and limit, when and where on the path.
 """
 
-import contextlib
 from collections import deque
 from pathlib import Path
 from typing import NoReturn, final
@@ -163,6 +162,8 @@ class SafetyGate(Robot):
         except ExecutionError as error:
             self._give_up(error)
             raise
+        except Exception as error:
+            raise self._defect(error) from error
         self._sent.append((q, qd, tip))
         self._way.append((q, tip))
         state = self._reported()
@@ -258,6 +259,8 @@ class SafetyGate(Robot):
             raise
         except WeldsimError as error:
             self._breach(Breach(rule="stale state", what="report", value=float("nan"), limit=0.0, text=str(error)))
+        except Exception as error:
+            raise self._defect(error) from error
 
     def _give_up(self, error: ExecutionError) -> None:
         """Stop, write, and add to the inner robot's own error where that was."""
@@ -265,6 +268,12 @@ class SafetyGate(Robot):
         error.data.setdefault("s", self._s)
         error.data.setdefault("segment", self._segment.value)
         error.data["black_box"] = self.black_box
+
+    def _defect(self, error: Exception) -> ExecutionError:
+        """What to raise, at rest, where the inner robot's own code failed."""
+        out = ExecutionError(f"{self.name}: {type(error).__name__}: {error}; the arc is off and the arm was stopped", rule="robot")
+        self._give_up(out)
+        return out
 
     def _breach(self, breach: Breach) -> NoReturn:
         """Stop, write, raise."""
@@ -295,11 +304,13 @@ class SafetyGate(Robot):
         for act, name in ((lambda: self.inner.set_arc(False), "arc off"), (self.inner.stop, "stop")):
             try:
                 act()
-            except WeldsimError as error:
-                self._keep([Event(t=t, kind="fault", text=f"{name}: {error}")])
-        with contextlib.suppress(WeldsimError):
+            except Exception as error:  # of any kind: what is still to be done is done
+                self._keep([Event(t=t, kind="fault", text=f"{name}: {type(error).__name__}: {error}")])
+        try:
             self._keep(self.inner.events())
             self._record(at_rest := self.inner.state(), at_rest.q, np.zeros(6))
+        except Exception as error:
+            self._keep([Event(t=t, kind="fault", text=f"no report after the stop: {type(error).__name__}: {error}")])
         self._forget()
         if self._folder is None:
             return

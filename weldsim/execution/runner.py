@@ -1,5 +1,6 @@
 """Runs a joint trajectory on a gated robot and returns what the robot did."""
 
+import gc
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -91,6 +92,8 @@ def execute(
     recorder = _Recorder(robot)
     recorder.add(trajectory.q[0], float(trajectory.s[0]), trajectory.segments[0])
     last = len(trajectory.t) - 1
+    collects = gc.isenabled()
+    gc.disable()  # a sweep through all that a long log holds takes longer than a robot waits for its next command
     try:
         for k in range(1, last + 1 + round(config.settle / robot.period)):
             i = min(k, last)
@@ -107,5 +110,7 @@ def execute(
         robot.stop()
         raise
     finally:
+        if collects:
+            gc.enable()
         robot.set_arc(False)
     return recorder.log()

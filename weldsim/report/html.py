@@ -111,7 +111,9 @@ def _plots(
         out.append(_figure(drawn, "Cross-track distance", figures.errors_distance(lines, config)))
     if welded < len(findings.seams):
         seam = findings.seams[welded]
-        out.append(_figure(drawn, "Mean cross-section", figures.section(cross_section(cloud, seam))))
+        cut = cross_section(cloud, seam)
+        if len(cut.across):  # a path that came from a file has no cloud about it
+            out.append(_figure(drawn, "Mean cross-section", figures.section(cut)))
         if seam.sigma is not None or seam.left_B is not None:
             out.append(_figure(drawn, "Standard deviation and width along the seam", figures.uncertainty(seam)))
     path = paths[welded] if welded < len(paths) else None

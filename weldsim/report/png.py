@@ -184,6 +184,10 @@ def _height_image(points: ndarray, height: ndarray) -> tuple[ndarray, tuple[floa
 
 def _section(axes: Axes, section: CrossSection) -> None:
     x = 1e3 * section.across
+    if not len(x):
+        axes.text(0.5, 0.5, "no cloud about the seam", transform=axes.transAxes, ha="center", color=SOFT, fontsize=11)
+        axes.set_axis_off()
+        return
     axes.fill_between(x, 1e3 * section.low, 1e3 * section.high, color="#9db4c9", alpha=0.6, lw=0, label="cloud, 16 to 84 %")
     axes.plot(x, 1e3 * section.median, color=WIRE, lw=1.8, label="cloud, median")
     if section.lips is not None:

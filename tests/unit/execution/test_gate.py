@@ -401,6 +401,23 @@ def test_a_robot_that_breaks_down_is_stopped_and_its_own_reason_kept(tmp_path: P
     assert read_black_box(str(caught.value.data["black_box"])).reason == "protective stop"
 
 
+def test_a_defect_of_the_robots_own_code_stops_the_arm_too(tmp_path: Path) -> None:
+    for name in ("servo", "state"):
+        puppet = Puppet()
+        gate = gate_around(puppet, folder=tmp_path)
+        gate.servo(START, STILL)
+
+        def fail(*_: object) -> None:
+            raise ValueError("I/O operation on closed file")
+
+        setattr(puppet, name, fail)
+        with pytest.raises(ExecutionError, match="ValueError: I/O operation") as caught:
+            gate.servo(START, STILL)
+        assert caught.value.data["rule"] == "robot"
+        assert puppet.calls[-2:] == ["arc off", "stop"]
+        assert caught.value.data["black_box"] is not None
+
+
 def test_a_stop_that_fails_is_told_and_the_black_box_written_all_the_same(tmp_path: Path) -> None:
     puppet = Puppet()
     gate = gate_around(puppet, folder=tmp_path)

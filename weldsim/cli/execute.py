@@ -1,0 +1,172 @@
+"""`weldsim execute`."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from weldsim.cli.dry_run import failures
+from weldsim.cli.options import ConfigOptions
+from weldsim.cli.outputs import check_folder, nearest_folder
+from weldsim.cli.show import print_json, progress, table, times
+from weldsim.errors import InputError
+
+if TYPE_CHECKING:
+    from weldsim.config import CellConfig
+    from weldsim.dryrun.cell import Cell
+    from weldsim.dryrun.program import Program
+    from weldsim.execution.robot import Robot
+    from weldsim.welding.job import Job, JobConfig
+
+MARKS = {True: "ok", False: "FAIL", None: "-"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execute(ConfigOptions):
+    """Weld a path with a robot, the twin's or a real one, through the safety gate.
+
+    Checks the contract with the robot, plans from where it stands, refuses what a dry run refuses, then moves. Writes a run
+    directory with log and report. Exits 1 when the robot was refused or stopped, or the weld failed its verdict.
+    """
+
+    file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
+    """A path (weldsim.path/1, .json) or UR poses (.csv: x y z rx ry rz)."""
+
+    robot: Literal["sim", "ur"]
+    """The simulated arm, or a UR5 over the network (or a `weldsim controller`)."""
+
+    scene: str | None = None
+    """What stands around the arm: name of a scene, or a TOML file. Default: arm and table alone."""
+
+    host: str | None = None
+    """Address of the UR controller."""
+
+    arc: bool = False
+    """Let the arc burn on the weld. Without it the same motion is made with the arc off."""
+
+    speed_scale: float = 1.0
+    """Share of the planned pace, over 0 to 1: 0.1 takes ten times as long."""
+
+    seam: int = 1
+    """Which seam of the file, counted from 1."""
+
+    out: Path | None = None
+    """The run directory; runs/FILE-ROBOT by default."""
+
+    def __call__(self) -> int:
+        """0 where the weld was made within every limit, else 1."""
+        from weldsim.welding.job import JobConfig, weld
+
+        if self.host is not None and self.robot != "ur":
+            raise InputError(f"--host {self.host}: the simulated arm has none; --robot ur is meant?", host=self.host)
+        config = self.cell()
+        folder = self.out or Path("runs") / f"{self.file.stem}-{self.robot}"
+        self._check(folder)
+        job = JobConfig(
+            seam=self.seam - 1,
+            arc=self.arc,
+            speed_scale=self.speed_scale,
+            black_boxes=folder.with_name(f"{folder.name}.black-box"),
+        )
+        program = self._program(config)
+
+        from weldsim.clock import Clock
+        from weldsim.welding.folder import job_document, write_job
+        from weldsim.welding.seams import file_findings
+
+        findings, cloud = file_findings(program, self.file)
+        scene = None if self.scene is None else self.scene_of(self.scene)
+        cell, known = self._cell(scene, config)
+        with progress() as tell:
+            clock = Clock(tell)
+            robot = self._robot(config, cell)
+            done = weld(program, findings, robot, cell, config, job, scene=scene, known=known, clock=clock)
+            tell("writing", None)
+            write_job(folder, self.file, program, findings, cloud, done, job, config, cell.name, scene, known)
+        written = [folder, *([done.black_box] if done.black_box is not None else [])]
+        if self.json:
+            print_json({**job_document(done, program, job, config, cell.name), "written": [str(path) for path in written]})
+        else:
+            self._print(done, program, job, config, scene, written)
+        return 0 if done.passed else 1
+
+    def _program(self, config: "CellConfig") -> "Program":
+        """The paths of the file. Raises InputError for anything else."""
+        from weldsim.dryrun.read import SCRIPTS, read_program
+
+        if self.file.suffix.lower() in SCRIPTS:
+            raise InputError(f"{self.file}: a robot program runs on the controller itself; execute takes paths (.json, .csv)")
+        program = read_program(self.file, speed=config.path.speed)
+        if not 1 <= self.seam <= len(program.paths):
+            raise InputError(f"--seam {self.seam}: {self.file} has {len(program.paths)}, counted from 1", seam=self.seam)
+        return program
+
+    def _check(self, folder: Path) -> None:
+        """Raises OutputError where the run directory cannot be written."""
+        from weldsim.run_folder import check_run_folder
+
+        if folder.name in ("", ".", ".."):
+            raise InputError(f"--out {folder}: give the run directory a name of its own", path=str(folder))
+        check_folder(nearest_folder(folder), folder)
+        check_run_folder(folder)
+
+    def _cell(self, scene: Any, config: "CellConfig") -> tuple["Cell", Any]:
+        """The cell, and its known seams where it is a scene of the twin."""
+        from weldsim.dryrun.cell import empty_cell, scene_cell
+
+        if scene is None:
+            return empty_cell(), None
+        from weldsim.scene.world import build_world
+
+        return scene_cell(scene), build_world(scene, twin=config.twin).known_seams
+
+    def _robot(self, config: "CellConfig", cell: "Cell") -> "Robot":
+        if self.robot == "sim":
+            from weldsim.execution.simulated import SimulatedRobot
+
+            return SimulatedRobot(cell.model, cell.q_start, config.execution.simulation)
+        from weldsim.execution.ur_robot import UrRobot
+
+        ur = config.execution.ur
+        return UrRobot(ur if self.host is None else replace(ur, host=self.host))
+
+    def _print(
+        self, done: "Job", program: "Program", job: "JobConfig", config: "CellConfig", scene: Any, written: list[Path]
+    ) -> None:
+        name = program.names[job.seam]
+        print(f"{program.source}, {name}, on {done.robot}: {_word(done)}")
+        if len(program.paths) > 1:
+            print(f"  seam {self.seam} of {len(program.paths)}; --seam picks another")
+        for note in program.notes:
+            print(f"  {note}")
+        rows = [[c.name, c.value, c.expected, MARKS[c.passed], c.advice if c.passed is False else ""] for c in done.clauses]
+        print(table(rows, ("contract", "robot", "expected", "", "")))
+        if done.trial is not None and not done.trial.passed:
+            print(f"  nothing has moved: a dry run from where the arm stands fails; `weldsim dry-run {self.file}` looks for a fix")
+            print(table(failures(done.trial), ("waypoint", "s", "verdict", "reason")))
+        if done.stopped is not None:
+            print(f"  {'stopped' if done.moved else 'nothing has moved'}: {done.stopped}")
+        if done.report is not None:
+            from weldsim.config import limits_for
+            from weldsim.report.limits import checks
+
+            limits = config.report if scene is None else limits_for(config, scene)
+            rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in checks(done.report, limits)]
+            print(table(rows, ("figure", "measured", "limit", "")))
+            for reason in () if done.report.passed else done.report.reasons:
+                print(f"  {reason}")
+        if done.moved:
+            pace = "" if job.speed_scale == 1 else f" at {100 * job.speed_scale:g} % of the pace"
+            print(f"  arc {'on' if job.arc else 'off all along: no --arc'}; {done.log.t[-1] - done.log.t[0]:.1f} s{pace}")  # type: ignore[union-attr]
+        print(times(done.timing))
+        for path in written:
+            print(f"  wrote {path}")
+
+
+def _word(done: "Job") -> str:
+    if done.passed:
+        return "WELDED" if done.log is not None and done.log.arc_on.any() else "DONE, arc off"
+    if done.moved:
+        return "STOPPED" if done.stopped is not None else "FAILED"
+    return "REFUSED"

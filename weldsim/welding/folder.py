@@ -1,0 +1,118 @@
+"""The folder that an executed job leaves behind: the same log and report as a run of the twin, whole or not at all."""
+
+import json
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from weldsim.config import CellConfig, digest, limits_for, to_json
+from weldsim.dryrun.program import Program
+from weldsim.dryrun.verdict import DryRun, dry_run_json
+from weldsim.execution.contract import Clause
+from weldsim.output import write_whole
+from weldsim.records import KnownSeam, PointCloud, RobotFacts, SeamFindings
+from weldsim.report.html import write_html
+from weldsim.report.png import write_png
+from weldsim.report.weld import report_json, versions
+from weldsim.run_folder import MANIFEST, SCHEMA, folder_in_place, log_bytes, write_json
+from weldsim.welding.job import Job, JobConfig, judged
+
+if TYPE_CHECKING:
+    from weldsim.scene.config import SceneConfig
+
+
+def write_job(
+    folder: Path,
+    file: Path,
+    program: Program,
+    findings: SeamFindings,
+    cloud: PointCloud,
+    done: Job,
+    job: JobConfig,
+    config: CellConfig,
+    cell: str,
+    scene: "SceneConfig | None" = None,
+    known: tuple[KnownSeam, ...] | None = None,
+) -> Path:
+    """The folder, in place of an earlier run's: config.json, the path file, contract.json, dry_run.json, and where the arm was
+    moved log.npz, report.json, report.html, report.png; run.json says what is what.
+
+    Raises:
+        OutputError: it cannot be written; nothing is left then.
+    """
+
+    def fill(place: Path) -> None:
+        resolved = {"cell": to_json(config), "scene": None if scene is None else to_json(scene), "job": job_json(job)}
+        write_json(place / "config.json", resolved)
+        shutil.copyfile(file, place / f"path{file.suffix.lower()}")
+        write_json(place / "contract.json", contract_json(done.clauses, done.facts))
+        if done.trial is not None:
+            dry = DryRun(source=program.source, cell=cell, trials=(done.trial,), fixes=((),), notes=program.notes)
+            write_json(place / "dry_run.json", dry_run_json(dry))
+        if done.log is not None and done.report is not None:
+            limits = config.report if scene is None else limits_for(config, scene)
+            write_whole(place / "log.npz", log_bytes(done.log))
+            write_json(place / "report.json", report_json(done.report, limits))
+            paths = tuple(done.path if i == job.seam else each for i, each in enumerate(program.paths))
+            shown = {"log": judged(done.log), "known": known or (), "welded": job.seam, "config": limits}
+            write_html(place / "report.html", done.report, cloud, findings, paths, **shown)
+            write_png(place / "report.png", done.report, cloud, findings, paths, **shown)
+        write_json(
+            place / MANIFEST,
+            {
+                "schema": SCHEMA,
+                "scene": None if scene is None else scene.name,
+                "robot": done.robot,
+                "source": program.source,
+                "passed": done.passed,
+                "moved": done.moved,
+                "stopped": None if done.stopped is None else str(done.stopped),
+                "black_box": None if done.black_box is None else done.black_box.name,
+                "config_digest": digest(config),
+                "versions": versions(),
+                "files": sorted(path.name for path in place.iterdir()),
+            },
+        )
+
+    return folder_in_place(folder, fill)
+
+
+def job_json(job: JobConfig) -> dict[str, Any]:
+    return {"seam": job.seam + 1, "arc": job.arc, "speed_scale": job.speed_scale}
+
+
+def contract_json(clauses: tuple[Clause, ...], facts: RobotFacts | None) -> dict[str, Any]:
+    """The contract as JSON values: its lines, and the plain facts."""
+    plain = ("model", "series", "version", "serial", "payload_kg", "remote_control", "safety", "mode", "program_running")
+    return {
+        "schema": "weldsim.contract/1",
+        "kept": all(clause.passed is not False for clause in clauses) and bool(clauses),
+        "facts": None if facts is None else {name: getattr(facts, name) for name in plain},
+        "clauses": [asdict(clause) for clause in clauses],
+    }
+
+
+def job_document(done: Job, program: Program, job: JobConfig, config: CellConfig, cell: str) -> dict[str, Any]:
+    """What became of a job, as JSON values."""
+    dry = None
+    if done.trial is not None:
+        dry = dry_run_json(DryRun(source=program.source, cell=cell, trials=(done.trial,), fixes=((),), notes=program.notes))
+    stopped = done.stopped
+    keep = ("rule", "what", "value", "limit", "t", "s", "segment")
+    data = {} if stopped is None else {name: stopped.data[name] for name in keep if name in stopped.data}
+    return {
+        "schema": "weldsim.execute/1",
+        "robot": done.robot,
+        "source": program.source,
+        "cell": cell,
+        **job_json(job),
+        "passed": done.passed,
+        "moved": done.moved,
+        "stopped": None if stopped is None else {"text": str(stopped), **json.loads(json.dumps(data, default=str))},
+        "black_box": None if done.black_box is None else str(done.black_box),
+        "contract": contract_json(done.clauses, done.facts),
+        "dry_run": dry,
+        "report": None if done.report is None else report_json(done.report, config.report),
+        "timing": {stage: round(seconds, 4) for stage, seconds in done.timing.items()},
+    }

@@ -1,0 +1,187 @@
+"""The job: a path welded by a robot, or refused for a stated reason before anything moves."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from weldsim.clock import Clock
+from weldsim.config import CellConfig, digest, limits_for
+from weldsim.dryrun.cell import Cell
+from weldsim.dryrun.program import Program
+from weldsim.dryrun.try_path import try_path
+from weldsim.dryrun.verdict import Trial
+from weldsim.errors import ExecutionError, InputError
+from weldsim.execution.contract import Clause, contract, require_kept
+from weldsim.execution.gate import SafetyGate
+from weldsim.execution.resample import LEAST_SCALE, at_period, slowed
+from weldsim.execution.robot import Robot
+from weldsim.execution.runner import execute
+from weldsim.path.asked import leaned, wire_tip
+from weldsim.records import ExecutionLog, KnownSeam, RobotFacts, SeamFindings, Segment, TorchPath, WeldReport
+from weldsim.report.weld import weld_report
+from weldsim.scene.config import SceneConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobConfig:
+    """What is asked of a job.
+
+    Attributes:
+        seam: which path of the program, from 0.  arc: whether the arc may burn.  speed_scale: share of the planned pace.
+        black_boxes: folder for what the gate leaves behind at a stop.
+    """
+
+    seam: int = 0
+    arc: bool = False
+    speed_scale: float = 1.0
+    black_boxes: Path | None = None
+
+    def __post_init__(self) -> None:
+        if not LEAST_SCALE <= self.speed_scale <= 1.0:
+            raise InputError(f"--speed-scale {self.speed_scale:g}: over 0, {LEAST_SCALE:g} at least, and at most 1 is possible")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job:
+    """What became of it.
+
+    Attributes:
+        robot: its name.  facts, clauses: what the robot said of itself, and the contract line by line.
+        trial: the dry run from where the robot stood, None where the contract was broken.
+        log: what the arm did, None where it was not moved.  report: its figures.
+        stopped: why the robot was refused or stopped, or None.  black_box: where it was written, or None.
+        path: as it was welded.  timing: seconds a stage.
+    """
+
+    robot: str
+    facts: RobotFacts | None
+    clauses: tuple[Clause, ...]
+    trial: Trial | None
+    log: ExecutionLog | None
+    report: WeldReport | None
+    stopped: ExecutionError | None
+    black_box: Path | None
+    path: TorchPath
+    timing: dict[str, float]
+
+    @property
+    def moved(self) -> bool:
+        return self.log is not None
+
+    @property
+    def passed(self) -> bool:
+        """Whether it was welded, and within every limit."""
+        return self.stopped is None and self.report is not None and self.report.passed
+
+
+def weld(
+    program: Program,
+    findings: SeamFindings,
+    robot: Robot,
+    cell: Cell,
+    config: CellConfig,
+    job: JobConfig,
+    *,
+    scene: SceneConfig | None = None,
+    known: tuple[KnownSeam, ...] | None = None,
+    clock: Clock | None = None,
+) -> Job:
+    """A path of a program executed by a robot through its safety gate.
+
+    Nothing moves unless the robot keeps its contract and the whole motion, planned from where the robot says it stands, passes
+    the dry run and every rule of the gate.
+
+    Args:
+        program: as `read_program` gives it, with paths.  findings: its seams, one a path.
+        robot: not yet connected; it is disconnected in the end.
+        cell: what stands around the arm; where the arm stands is read from the robot.
+        config: every stage's settings.  job: what is asked.
+        scene, known: the scene and its known seams, where it is one of the twin.
+        clock: takes the times.
+    Raises:
+        InputError: a seam that the program does not have.
+        ExecutionError: the robot cannot be connected.
+    """
+    clock = clock or Clock()
+    if not 0 <= job.seam < len(program.paths):
+        raise InputError(f"seam {job.seam + 1}: {program.source} has {len(program.paths)}, counted from 1", seam=job.seam + 1)
+    path = program.paths[job.seam]
+    facts: RobotFacts | None = None
+    clauses: tuple[Clause, ...] = ()
+    trial, log, stopped = None, None, None
+    gate = SafetyGate(robot, config.execution.gate, arc=job.arc, folder=job.black_boxes)
+    with clock.stage("connect"):
+        gate.connect()
+    try:
+        with clock.stage("contract"):
+            facts = gate.facts()
+            clauses = contract(facts, gate.state(), config.execution.contract)
+            require_kept(clauses, gate.name)
+        with clock.stage("dry run"):
+            here = replace(cell, q_start=np.array(gate.state().q))
+            trial = try_path(path, program.names[job.seam], here, replace(config.motion, period=gate.period))
+        if trial.passed and trial.trajectory is not None:
+            trajectory = at_period(slowed(trial.trajectory, job.speed_scale), gate.period)
+            with clock.stage("execution"):
+                log = execute(gate, trajectory, config.execution, lambda done: clock.tell("execution", done))
+    except ExecutionError as error:
+        stopped = error
+        found = error.data.get("log")
+        log = found if isinstance(found, ExecutionLog) else None
+    finally:
+        gate.disconnect()
+    path = replace(path, speed=path.speed * job.speed_scale)
+    report = None
+    if log is not None:
+        with clock.stage("report"):
+            report = job_report(program, findings, path, log, config, job, scene=scene, known=known, stopped=stopped)
+        report = replace(report, timing=dict(clock.seconds))
+    return Job(
+        robot=gate.name,
+        facts=facts,
+        clauses=clauses,
+        trial=trial,
+        log=log,
+        report=report,
+        stopped=stopped,
+        black_box=gate.black_box,
+        path=path,
+        timing=dict(clock.seconds),
+    )
+
+
+def judged(log: ExecutionLog) -> ExecutionLog:
+    """The log with the whole weld as if the arc had burnt: what a job without the arc is judged by."""
+    return log if log.arc_on.any() else replace(log, arc_on=np.array([segment == Segment.WELD for segment in log.segments]))
+
+
+def job_report(
+    program: Program,
+    findings: SeamFindings,
+    path: TorchPath,
+    log: ExecutionLog,
+    config: CellConfig,
+    job: JobConfig,
+    *,
+    scene: SceneConfig | None,
+    known: tuple[KnownSeam, ...] | None,
+    stopped: ExecutionError | None,
+) -> WeldReport:
+    """The report of `weldsim run` on what was executed; a stop fails it, whatever its figures."""
+    paths = tuple(path if i == job.seam else each for i, each in enumerate(program.paths))
+    log = judged(log) if stopped is None else log
+    report = weld_report(
+        findings,
+        tuple(replace(each, X_BT=wire_tip(each.X_BT, config.path)) for each in paths),
+        scene="empty cell" if scene is None else scene.name,
+        log=replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
+        known=None if known is None else tuple(leaned(seam, path, config.path) for seam in known),
+        welded=job.seam,
+        trims=(config.path.start_trim, config.path.end_trim),
+        config_digest=digest(config),
+        config=config.report if scene is None else limits_for(config, scene),
+    )
+    if stopped is None:
+        return report
+    return replace(report, passed=False, reasons=(str(stopped), *(report.reasons if not report.passed else ())))
