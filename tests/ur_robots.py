@@ -12,6 +12,8 @@ from weldsim.controller.ask import ask
 from weldsim.execution.ur_config import Series, UrConfig
 from weldsim.execution.ur_ports import REALTIME
 from weldsim.execution.ur_robot import UrRobot
+from weldsim.kinematics import JOINT_NAMES
+from weldsim.records import JointTrajectory, Segment
 
 SPEED, ACCELERATION = 2.0, 6.0  # [rad/s], [rad/s2] of the way to where a test begins
 
@@ -42,3 +44,20 @@ def ur_robot(host: str, q: ndarray | None = None, **settings: object) -> UrRobot
     if q is not None:
         place(host, q)
     return UrRobot(UrConfig(host=host, **settings))  # type: ignore[arg-type]
+
+
+def weld(q: ndarray, period: float, seconds: float = 5.0, reach: float = 0.3) -> JointTrajectory:
+    """A weld from q and back by the first joint, `reach` rad wide, the arc on from 0.1 s."""
+    t = np.arange(0.0, seconds, period)
+    rate = 2 * np.pi / seconds
+    swing, zeros = np.array([1.0, 0, 0, 0, 0, 0]), np.zeros((len(t), 6))
+    return JointTrajectory(
+        t=t,
+        q=q + reach / 2 * (1 - np.cos(rate * t))[:, None] * swing,
+        qd=reach / 2 * rate * np.sin(rate * t)[:, None] * swing,
+        qdd=zeros,
+        s=0.01 * t,
+        arc_on=t > 0.1,
+        segments=(Segment.WELD,) * len(t),
+        joint_names=JOINT_NAMES,
+    )

@@ -66,7 +66,7 @@ class UrConfig:
     follow_limit: float = 0.05
     """Greatest distance [rad] of the controller's own target from every command of the last moments: beyond it the controller
     obeys somebody else."""
-    answer_timeout: Second = 0.15
+    answer_timeout: Second = 0.1
     """Longest time that the client process may take to pass on a command; then it is killed."""
     connect_timeout: Second = 10.0
     """Longest time of one step of connecting."""
@@ -90,10 +90,12 @@ class UrConfig:
                 )
         if not all(abs(r) <= 6.3 for r in self.tcp[3:]):
             raise ConfigError(f"ur.tcp = {self.tcp}: a rotation vector beyond a whole turn; radians are meant", key="ur.tcp")
-        if self.stall >= 1 / self.watchdog_rate:
-            raise ConfigError(
-                f"ur.stall = {self.stall} s: must be shorter than a period of the watchdog, {1 / self.watchdog_rate:g} s",
-                key="ur.stall",
-                value=self.stall,
-                limit=1 / self.watchdog_rate,
-            )
+        limit = 1 / self.watchdog_rate
+        for name in ("stall", "answer_timeout"):  # or the watchdog comes first, and knows no reason
+            if (value := getattr(self, name)) >= limit:
+                raise ConfigError(
+                    f"ur.{name} = {value} s: must be shorter than a period of the watchdog, {limit:g} s",
+                    key=f"ur.{name}",
+                    value=value,
+                    limit=limit,
+                )

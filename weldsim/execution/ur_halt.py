@@ -70,7 +70,7 @@ class Halt:
                 self._force()
             try:
                 if self._link.stream.wait(STEP):
-                    sample = self._link.stream.waiting.popleft()
+                    sample = self._link.stream.take()
                     calm = self._calm(sample)
                     yield sample
             except LinkError as lost:

@@ -128,7 +128,7 @@ def _await(stream: StateStream, condition: Callable[[Sample], bool], seconds: fl
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
         if stream.wait(left):
-            sample = stream.waiting.popleft()
+            sample = stream.take()
             if condition(sample):
                 return sample
     raise LinkError(f"the controller did not {goal} within {seconds:g} s")
@@ -136,8 +136,7 @@ def _await(stream: StateStream, condition: Callable[[Sample], bool], seconds: fl
 
 def _skip_old(stream: StateStream, seconds: float) -> None:
     """Nothing, once what was on its way before this call is taken. Raises LinkError."""
-    stream.pump()
-    stream.waiting.clear()
+    stream.take_all()
     for _ in range(ON_ITS_WAY):
         _await(stream, lambda sample: True, seconds)
 

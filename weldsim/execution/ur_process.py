@@ -59,10 +59,11 @@ class ClientProcess:
         self.tcp: list[float] = []
         self.times: deque[float] = deque(maxlen=KEPT_TIMES)
         self.refusal: Refusal | None = None
-        self._count, self._gap = 0, 0.0
+        self._count = 0
         self._waiting: deque[tuple[int, float]] = deque()  # number and time of servo commands not answered yet
         self._stopped: int | None = None  # number of the last stop that was answered
         self._ready, self._failure = False, ""
+        self._ended = ""  # how, once it was killed
 
     def fileno(self) -> int:
         """For select: readable when the process has said something or has ended."""
@@ -105,16 +106,21 @@ class ClientProcess:
 
     def check(self) -> None:
         """Nothing, where it lives and answers in time; else raises ClientError."""
-        if self._waiting:
-            waits = time.monotonic() - self._waiting[0][1]
-            if waits > self._timeout:
-                self.pump()
-            if self._waiting and waits > self._timeout:
-                raise ClientError(f"the client process has not answered for {waits:.3f} s (limit {self._timeout:g} s)")
+        if self._overdue > 0:
+            self.pump()  # the answer may have come while this process was held up
+        if self._overdue > 0:
+            waits = self._timeout + self._overdue
+            raise ClientError(f"the client process has not answered for {waits:.3f} s (limit {self._timeout:g} s)")
+
+    @property
+    def _overdue(self) -> float:
+        """By how much [s] the answer that is waited for longest is late; at most 0 where it is not."""
+        return time.monotonic() - self._waiting[0][1] - self._timeout if self._waiting else 0.0
 
     def pump(self, wait: bool = False) -> None:
         """Read what it has said; with `wait`, for a moment. Raises ClientError where it has ended."""
         while True:
+            self._must_live()
             try:
                 data = self._channel.recv(MAX_MESSAGE)
             except (BlockingIOError, TimeoutError):
@@ -134,7 +140,7 @@ class ClientProcess:
                     self._waiting.popleft()
                 self.times.append(when)
                 if not done and self.refusal is None:
-                    self.refusal = Refusal(why, self._gap if why == "stall" else 0.0)
+                    self.refusal = Refusal(why)
             case ["stop" | "quit", number, _]:
                 self._stopped = number
             case ["ready", tcp]:
@@ -142,7 +148,7 @@ class ClientProcess:
             case ["failed", text]:
                 self._failure = text
             case ["stall", gap]:
-                self._gap = gap
+                self.refusal = Refusal("stall", gap)
 
     def close(self, seconds: float) -> bool:
         """End it in order: arc off, rest, program on the controller ended; killed where it takes too long. Whether in order."""
@@ -161,12 +167,19 @@ class ClientProcess:
 
     def kill(self) -> None:
         """End it at once; harmless when it has ended."""
-        self._process.kill()
-        self._process.wait()
-        self._channel.close()
-        self._noise.close()
+        if not self._ended:
+            self._process.kill()
+            self._process.wait()
+            self._ended = self._epitaph()
+            self._channel.close()
+            self._noise.close()
+
+    def _must_live(self) -> None:
+        if self._ended:
+            raise ClientError(self._ended)
 
     def _send(self, words: list) -> None:
+        self._must_live()
         try:
             self._channel.send(json.dumps(words).encode())
         except BlockingIOError:

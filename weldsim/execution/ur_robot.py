@@ -7,7 +7,6 @@ output's own setting on the controller, `Low when not running`, which cannot be 
 """
 
 import math
-import select
 import time
 from collections import deque
 from typing import NoReturn, final
@@ -37,7 +36,9 @@ from weldsim.records import Event, RobotFacts, RobotState
 
 FOLLOW_SPAN = 0.15  # [s] beyond the look-ahead in which the controller's target must have passed one of our commands
 ARC_DELAY = 0.06  # [s] after which an output that was switched on is reported on
-BEHIND = 2  # periods that are caught up with; more are passed over
+BEHIND = 0.012  # [s] of lateness that is caught up with, two periods at least; more is passed over
+GRACE = 0.02  # [s] for what came in while this process was held up
+SILENT = 0.5  # [s] without a state after which `state` says that there is no link
 EVIDENCE = 0.1  # [s] in which the state says why a command was refused
 
 
@@ -66,6 +67,11 @@ class UrRobot(Robot):
     def servo_times(self) -> tuple[float, ...]:
         """Host's monotonic times [s] of the last servoJ calls of this connection."""
         return tuple(self._link.client.times) if self._link else ()
+
+    @property
+    def client_pid(self) -> int | None:
+        """Number of the process that commands, None when not connected."""
+        return self._link.client.pid if self._link else None
 
     def connect(self) -> None:
         """Stops whatever program runs, uploads the control program, sets TCP and payload and reads them back."""
@@ -104,10 +110,10 @@ class UrRobot(Robot):
 
     def state(self) -> RobotState:
         """The state that ended the last `servo`; the newest where nothing is being streamed, or the caller is late."""
-        if self._link is not None and time.monotonic() - self._served > BEHIND * self.period:
+        if self._link is not None and time.monotonic() - self._served > self._behind * self.period:
             self._read_all(self._link)
-        lost = self._link is None or (self._trouble is not None and self._trouble.rule in ("link", "silence"))
-        return robot_state(self._last, self._origin, "disconnected" if lost else mode_word(self._last))
+        silent = time.monotonic() - self._last.arrived > max(SILENT, self.config.silence)
+        return robot_state(self._last, self._origin, "disconnected" if silent or self._link is None else mode_word(self._last))
 
     def torque(self) -> Float[ndarray, "6"] | None:
         """As measured, where the software reports it (5.23 and newer); its older figures are currents, or the model's own."""
@@ -136,7 +142,8 @@ class UrRobot(Robot):
             raise ExecutionError(f"{self.name}: target {target} is not finite", rule="finite", t=self._t)
         if time.monotonic() - self._served > self.config.stall:  # a new stream: the commands of the last one say nothing
             self._sent.clear()
-            self._read_all(link)
+            if len(link.stream) > self._behind:
+                self._read_all(link)
             if trouble := safety_trouble(self._last) or program_trouble(self._last, None):
                 self._give_up(link, trouble)
         try:
@@ -161,23 +168,16 @@ class UrRobot(Robot):
 
     def _await_next(self, link: Link) -> None:
         """Take the next state, when it comes; raises LinkError, ClientError."""
-        stream, client = link.stream, link.client
-        end = time.monotonic() + self.config.silence
-        stream.pump()
-        while not stream.waiting:
-            left = end - time.monotonic()
-            if left <= 0:
-                age = time.monotonic() - self._last.arrived
-                text = f"no state for {age:.3f} s (limit {self.config.silence:g} s); see to the network, connect again"
-                self._give_up(link, Trouble("silence", text, age, self.config.silence))
-            select.select([stream, client], [], [], left)
-            stream.pump()
-            client.pump()
-        client.pump()
-        client.check()
-        late = len(stream.waiting) - 1
-        self._take(stream.waiting.popleft())
-        if late > BEHIND:
+        stream, limit = link.stream, self.config.silence
+        if not (stream.wait(limit) or stream.wait(GRACE)):
+            age = time.monotonic() - self._last.arrived
+            text = f"no state for {age:.3f} s (limit {limit:g} s); see to the network, connect again"
+            self._give_up(link, Trouble("silence", text, age, limit))
+        link.client.pump()
+        link.client.check()
+        late = len(stream) - 1
+        self._take(stream.take())
+        if late > self._behind:
             self._note("late", f"this computer was {late} periods late; it goes on from here")
             self._read_all(link)
 
@@ -207,7 +207,7 @@ class UrRobot(Robot):
         end = time.monotonic() + EVIDENCE
         try:
             while (left := end - time.monotonic()) > 0 and link.stream.wait(left):
-                self._take(link.stream.waiting.popleft())
+                self._take(link.stream.take())
                 if trouble := safety_trouble(self._last) or program_trouble(self._last, None):
                     return trouble
         except LinkError as lost:
@@ -235,13 +235,12 @@ class UrRobot(Robot):
     def _read_all(self, link: Link) -> None:
         """Take every state that has come in; a lost link is remembered, not raised."""
         try:
-            link.stream.pump()
+            for sample in link.stream.take_all():
+                self._take(sample)
         except LinkError as lost:
             if self._trouble is None:
                 self._trouble = Trouble("link", f"{lost}; connect again")
                 self._note("link", str(lost))
-        while link.stream.waiting:
-            self._take(link.stream.waiting.popleft())
 
     def _take(self, sample: Sample) -> None:
         before, self._sample = self._sample, sample
@@ -252,6 +251,11 @@ class UrRobot(Robot):
         if self._link is None:
             raise ExecutionError(f"{self.name}: {asked} before connect()", rule="connection", t=self._t)
         return self._link
+
+    @property
+    def _behind(self) -> int:
+        """Periods of lateness that are caught up with."""
+        return max(2, round(BEHIND / self.period))
 
     @property
     def _last(self) -> Sample:

@@ -5,12 +5,13 @@ only, so a reader that is late loses some, and its constructor waits for ever, h
 accepts and says nothing.
 """
 
-import select
 import socket
 import struct
+import threading
 import time
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,8 @@ from weldsim.execution.ur_ports import RTDE
 
 RECEIVE_SIZE = 65536
 PROTOCOL = 2
+READ_TIMEOUT = 0.5  # [s]
+KEPT = 2000  # samples that nobody has taken: 4 s at 500 Hz
 NEEDED: dict[str, str] = {
     "timestamp": "DOUBLE",
     "actual_q": "VECTOR6D",
@@ -82,14 +85,14 @@ class StateStream:
 
     Attributes:
         version: of the controller: major, minor, bugfix, build.  frequency: of control [Hz].
-        waiting: samples that have come in and were not taken yet.
     """
 
     def __init__(self, host: str, timeout: float) -> None:
         """Connects, and asks for every control period; raises LinkError where that takes longer than `timeout` [s]."""
-        self.waiting: deque[Sample] = deque()
+        self._waiting: deque[Sample] = deque(maxlen=KEPT)
         self._reader = PacketReader()
-        self._loss = ""
+        self._loss, self._closing = "", False
+        self._news = threading.Condition()
         end = time.monotonic() + timeout
         try:
             self._socket = socket.create_connection((host, RTDE), timeout)
@@ -100,6 +103,9 @@ class StateStream:
         except LinkError:
             self._socket.close()
             raise
+        # Always read: a controller hangs up on who does not keep up, and the newest state must not lie behind old ones.
+        self._thread = threading.Thread(target=self._read, name=f"RTDE {host}", daemon=True)
+        self._thread.start()
 
     def _set_up(self, end: float) -> None:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -119,7 +125,7 @@ class StateStream:
         self._layout = layout(tuple(names.values()))
         if self._ask(PacketType.START, b"", end)[:1] != b"\x01":
             raise LinkError("the controller does not start its stream of states")
-        self._socket.setblocking(False)
+        self._socket.settimeout(READ_TIMEOUT)
 
     def _request(self, names: dict[str, str], end: float) -> tuple[int, dict[str, str]]:
         """Number of the recipe that would report these, and the type that the controller gives each."""
@@ -150,34 +156,55 @@ class StateStream:
         except InputError as error:
             raise LinkError(str(error)) from None
 
-    def fileno(self) -> int:
-        """For select: readable when something has come in."""
-        return self._socket.fileno()
-
-    def pump(self) -> None:
-        """Move what has come in to `waiting`. Raises LinkError, once, when the connection has gone and nothing waits."""
-        while not self._loss:
+    def _read(self) -> None:
+        """Take what comes in, until the connection ends; the thread's body."""
+        loss = ""
+        while not loss:
             try:
                 data = self._socket.recv(RECEIVE_SIZE)
                 arrived = time.monotonic()
-                self.waiting.extend(self._sample(packet, arrived) for packet in self._packets(data) if self._is_state(packet))
-            except BlockingIOError:
-                break
+                samples = [self._sample(packet, arrived) for packet in self._packets(data) if self._is_state(packet)]
+            except TimeoutError:
+                loss = "" if not self._closing else "closed"
+                continue
             except OSError as error:
-                self._loss = f"RTDE connection: {error.strerror or error}"
+                loss = f"RTDE connection: {error.strerror or error}"
+                continue
             except LinkError as error:
-                self._loss = str(error)
-        if self._loss and not self.waiting:
-            raise LinkError(self._loss)
+                loss = str(error)
+                continue
+            with self._news:
+                self._waiting.extend(samples)
+                self._news.notify_all()
+        with self._news:
+            self._loss = loss
+            self._news.notify_all()
 
     def wait(self, seconds: float) -> bool:
-        """Whether a sample waits, now or within `seconds`. Raises LinkError."""
-        end = time.monotonic() + seconds
-        self.pump()
-        while not self.waiting and (left := end - time.monotonic()) > 0:
-            select.select([self._socket], [], [], left)
-            self.pump()
-        return bool(self.waiting)
+        """Whether a sample waits, now or within `seconds`. Raises LinkError when none does and the connection has gone."""
+        with self._news:
+            self._news.wait_for(lambda: self._waiting or self._loss, max(0.0, seconds))
+            if self._loss and not self._waiting:
+                raise LinkError(self._loss)
+            return bool(self._waiting)
+
+    def take(self) -> Sample:
+        """The oldest sample that waits; one must (`wait`)."""
+        with self._news:
+            return self._waiting.popleft()
+
+    def take_all(self) -> list[Sample]:
+        """Every sample that waits, in order. Raises LinkError when none does and the connection has gone."""
+        with self._news:
+            if self._loss and not self._waiting:
+                raise LinkError(self._loss)
+            samples = list(self._waiting)
+            self._waiting.clear()
+            return samples
+
+    def __len__(self) -> int:
+        """How many samples wait."""
+        return len(self._waiting)
 
     def _is_state(self, packet: Packet) -> bool:
         return packet.type == PacketType.DATA and len(packet.payload) > self._layout.size and packet.payload[0] == self._recipe
@@ -189,4 +216,8 @@ class StateStream:
 
     def close(self) -> None:
         """Hang up; harmless when that has happened."""
+        self._closing = True
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)  # wakes the reading thread
+        self._thread.join(READ_TIMEOUT * 2)
         self._socket.close()
