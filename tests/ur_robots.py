@@ -49,12 +49,12 @@ def ur_robot(host: str, q: ndarray | None = None, **settings: object) -> UrRobot
 def weld(q: ndarray, period: float, seconds: float = 5.0, reach: float = 0.3) -> JointTrajectory:
     """A weld from q and back by the first joint, `reach` rad wide, the arc on from 0.1 s."""
     t = np.arange(0.0, seconds, period)
-    rate = 2 * np.pi / seconds
+    sine, cosine = np.sin(np.pi * t / seconds), np.cos(np.pi * t / seconds)  # its fourth power begins without a jerk
     swing, zeros = np.array([1.0, 0, 0, 0, 0, 0]), np.zeros((len(t), 6))
     return JointTrajectory(
         t=t,
-        q=q + reach / 2 * (1 - np.cos(rate * t))[:, None] * swing,
-        qd=reach / 2 * rate * np.sin(rate * t)[:, None] * swing,
+        q=q + reach * sine[:, None] ** 4 * swing,
+        qd=reach * 4 * np.pi / seconds * (sine**3 * cosine)[:, None] * swing,
         qdd=zeros,
         s=0.01 * t,
         arc_on=t > 0.1,

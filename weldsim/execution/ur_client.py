@@ -19,6 +19,7 @@ import socket
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 
 from weldsim.execution.ur_rtde import Control, Signals, open_control, open_signals
@@ -159,6 +160,12 @@ def say(channel: socket.socket, *words: object) -> None:
         return
 
 
+def hurry() -> None:
+    """Ask for real-time priority for this thread, not those of the library; it goes without where that is not allowed."""
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+
+
 def main(descriptor: str, text: str) -> None:
     """Connect, and serve."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the owner, who then stops us in order
@@ -167,6 +174,7 @@ def main(descriptor: str, text: str) -> None:
         try:
             client = Client(channel, settings, open_control(settings.host), open_signals(settings.host))
             client.prepare()
+            hurry()
         except Exception as error:  # the library raises whatever it likes; the owner is told
             say(channel, "failed", " ".join(str(error).split())[:1000])
         else:

@@ -55,18 +55,18 @@ class UrConfig:
     """Smoothing time of servoJ; the arm follows about this much late. 0.03 to 0.2 s."""
     gain: float = 300.0
     """Position gain of servoJ, 100 to 2000; 300 is the controller's own default."""
-    watchdog_rate: float = 8.0
+    watchdog_rate: float = 6.0
     """Rate [Hz] at which the controller must be commanded, or it ends its program: the arm rests, the arc drops."""
-    stall: Second = 0.1
+    stall: Second = 0.12
     """Longest time between two commands of a stream; then the client process stops arm and arc by itself."""
-    silence: Second = 0.1
+    silence: Second = 0.12
     """Longest time without a state from the controller while streaming."""
     stop_deceleration: float = 15.0
     """Joint deceleration of a stop [rad/s2]."""
     follow_limit: float = 0.05
     """Greatest distance [rad] of the controller's own target from every command of the last moments: beyond it the controller
     obeys somebody else."""
-    answer_timeout: Second = 0.1
+    answer_timeout: Second = 0.12
     """Longest time that the client process may take to pass on a command; then it is killed."""
     connect_timeout: Second = 10.0
     """Longest time of one step of connecting."""
