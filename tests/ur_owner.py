@@ -49,7 +49,7 @@ def summary(error: ExecutionError | None, log: object, robot: UrRobot) -> dict[s
         "arc": robot.arc,
     }
     if isinstance(log, ExecutionLog):
-        seen |= {"t": log.t.tolist(), "arc_on": log.arc_on.tolist(), "q": log.q_act.tolist()}
+        seen |= {"t": log.t.tolist(), "arc_on": log.arc_on.tolist(), "qd": log.qd_act.tolist()}
         seen["events"] = [(event.t, event.kind, event.text) for event in log.events]
     return seen
 

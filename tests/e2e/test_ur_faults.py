@@ -104,10 +104,11 @@ def check_end(seen: dict[str, Any], rule: str) -> None:
     """The reason is told, the arc is off, and the log has every period up to the stop."""
     assert seen["rule"] == rule, seen["text"]
     assert not seen["arc"]
-    steps = np.diff(seen["t"]) / seen["period"]
-    assert np.abs(steps - np.round(steps)).max() < 1e-3
-    assert np.median(steps) == pytest.approx(1.0, abs=1e-6)
-    assert len(steps) > 0.8 * steps.sum()
+    gaps = np.diff(seen["t"])
+    if rule in ("link", "silence"):  # but for the time when there was nothing to be had
+        gaps = np.delete(gaps, gaps.argmax())
+    np.testing.assert_allclose(gaps, seen["period"], rtol=1e-6)
+    assert np.abs(seen["qd"][-1]).max() < AT_REST
     assert any(seen["arc_on"])
     assert rule in {kind for _, kind, _ in seen["events"]}
     assert seen["text"] in {text for _, _, text in seen["events"]}

@@ -87,6 +87,9 @@ class SafetyGate(Robot):
     def torque(self) -> Float[ndarray, "6"] | None:
         return self.inner.torque()
 
+    def passed_over(self) -> tuple[tuple[RobotState, bool], ...]:
+        return self.inner.passed_over()
+
     def events(self) -> tuple[Event, ...]:
         """The inner robot's, and the gate's own: stops."""
         self._keep(self.inner.events())

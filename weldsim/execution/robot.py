@@ -63,6 +63,13 @@ class Robot(ABC):
         """Joint torques [Nm] as the robot reports them, or None."""
         return None
 
+    def passed_over(self) -> tuple[tuple[RobotState, bool], ...]:
+        """What was reported since the last call before the newest state, and the arc output with each, in order.
+
+        Empty where every state was looked at in time; a robot keeps its own time, and who commands it may be late.
+        """
+        return ()
+
     def events(self) -> tuple[Event, ...]:
         """What happened since the last call, in order."""
         return ()

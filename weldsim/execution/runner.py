@@ -32,8 +32,24 @@ class _Recorder:
     events: list[Event] = field(default_factory=list)
 
     def add(self, sent: Float[ndarray, "6"], s: float, segment: Segment) -> None:
-        state = self.robot.state()
-        arc = self.robot.arc
+        """The state now, and those before it that nobody had time to look at, which belong to the command before."""
+        state, arc = self.robot.state(), self.robot.arc
+        passed = self.robot.passed_over()
+        if self.states:
+            for earlier, burning in passed:
+                self._row(earlier, burning, self.commands[-1], *self.labels[-1])
+        self._row(state, arc, sent, s, segment)
+        self.events.extend(self.robot.events())
+
+    def end(self) -> None:
+        """What the robot has reported on its way to rest."""
+        now = self.robot.state(), self.robot.arc
+        for state, burning in (*self.robot.passed_over(), now):
+            if state.t > self.states[-1].t:
+                self._row(state, burning, self.commands[-1], *self.labels[-1])
+        self.events.extend(self.robot.events())
+
+    def _row(self, state: RobotState, arc: bool, sent: Float[ndarray, "6"], s: float, segment: Segment) -> None:
         if arc != (self.arcs[-1] if self.arcs else False):
             self.events.append(Event(t=state.t, kind="arc", text=f"arc {'on' if arc else 'off'} at s = {1e3 * s:.1f} mm"))
         if not self.labels or self.labels[-1][1] != segment:
@@ -43,9 +59,8 @@ class _Recorder:
         self.torques.append(self.robot.torque())
         self.arcs.append(arc)
         self.labels.append((s, segment))
-        self.events.extend(self.robot.events())
 
-    def log(self, late: tuple[Event, ...] = ()) -> ExecutionLog:
+    def log(self) -> ExecutionLog:
         states = self.states
         poses = [state.X_BT for state in states]
         torques = [torque for torque in self.torques if torque is not None]
@@ -61,14 +76,14 @@ class _Recorder:
             period=self.robot.period,
             robot=self.robot.name,
             torque=np.stack(torques) if len(torques) == len(states) else None,
-            events=tuple(sorted((*self.events, *late), key=lambda event: event.t)),
+            events=tuple(sorted(self.events, key=lambda event: event.t)),
         )
 
 
 def execute(
     robot: SafetyGate, trajectory: JointTrajectory, config: ExecutionConfig | None = None, progress: Progress | None = None
 ) -> ExecutionLog:
-    """What a connected robot did when sent the trajectory, one row a period of the robot.
+    """What a connected robot did when sent the trajectory, one row a period of the robot; after a stop, down to rest.
 
     The arc burns only where the trajectory says so, its segment is WELD and the gate permits it; it is off when this returns,
     however it does. Every command is checked before the first is sent, and again as it is.
@@ -104,7 +119,8 @@ def execute(
             if progress is not None and k % 32 == 0:
                 progress(min(1.0, k / last))
     except ExecutionError as error:  # the gate has stopped the arm
-        error.data["log"] = recorder.log(robot.events())
+        recorder.end()
+        error.data["log"] = recorder.log()
         raise
     except BaseException:
         robot.stop()

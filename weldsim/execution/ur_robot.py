@@ -36,8 +36,9 @@ from weldsim.records import Event, RobotFacts, RobotState
 
 FOLLOW_SPAN = 0.15  # [s] beyond the look-ahead in which the controller's target must have passed one of our commands
 ARC_DELAY = 0.06  # [s] after which an output that was switched on is reported on
-BEHIND = 0.012  # [s] of lateness that is caught up with, two periods at least; more is passed over
+BEHIND = 0.012  # [s] of lateness that is caught up with, two periods at least; more is not
 GRACE = 0.02  # [s] for what came in while this process was held up
+TAKEN = 2000  # states kept for `passed_over`: 4 s at 500 Hz
 SILENT = 0.5  # [s] without a state after which `state` says that there is no link
 EVIDENCE = 0.1  # [s] in which the state says why a command was refused
 
@@ -62,6 +63,7 @@ class UrRobot(Robot):
         self._trouble: Trouble | None = None
         self._events: list[Event] = []
         self._sent: deque[list[float]] = deque()
+        self._taken: deque[Sample] = deque(maxlen=TAKEN)
 
     @property
     def servo_times(self) -> tuple[float, ...]:
@@ -127,6 +129,14 @@ class UrRobot(Robot):
     def arc(self) -> bool:
         """The output as last reported, after `disconnect` too."""
         return self._sample is not None and bool(self._sample.actual_digital_output_bits >> self.config.arc_output & 1)
+
+    def passed_over(self) -> tuple[tuple[RobotState, bool], ...]:
+        taken, bit = list(self._taken)[:-1], self.config.arc_output
+        self._taken.clear()
+        return tuple(
+            (robot_state(sample, self._origin, mode_word(sample)), bool(sample.actual_digital_output_bits >> bit & 1))
+            for sample in taken
+        )
 
     def events(self) -> tuple[Event, ...]:
         happened, self._events = tuple(self._events), []
@@ -244,6 +254,7 @@ class UrRobot(Robot):
 
     def _take(self, sample: Sample) -> None:
         before, self._sample = self._sample, sample
+        self._taken.append(sample)
         if before is not None and (was := mode_word(before)) != (now := mode_word(sample)):
             self._note("mode", f"{was} -> {now}".replace("_", " "))
 
