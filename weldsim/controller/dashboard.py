@@ -36,7 +36,7 @@ class Dashboard:
 
     def __init__(self, machine: Machine) -> None:
         self._machine = machine
-        self._role = "PROGRAMMER"
+        self._role, self._mode = "PROGRAMMER", "NONE"
         plain: dict[str, Callable[[], str]] = {
             "play": self._play,
             "stop": self._stop,
@@ -65,7 +65,8 @@ class Dashboard:
         if machine.profile.remote_control:
             plain |= {
                 "is in remote control": lambda: str(machine.remote).lower(),
-                "get operational mode": lambda: "NONE",
+                "get operational mode": lambda: self._mode,
+                "clear operational mode": self._clear_mode,
             }
         self._plain = plain
         self._with_text: dict[str, Callable[[str], str]] = {
@@ -74,6 +75,8 @@ class Dashboard:
             "addToLog": self._add_to_log,
             "setUserRole": self._set_role,
         }
+        if machine.profile.remote_control:
+            self._with_text["set"] = self._set_mode
 
     def answer(self, line: str) -> str:
         """The reply to one line, without newlines."""
@@ -99,8 +102,11 @@ class Dashboard:
         return f"{state} {self._machine.program_name or self._machine.loaded or '<unnamed>'}"
 
     def _load(self, name: str) -> str:
-        if not name:
-            return "Error while loading program: "
+        kind, _, file = name.partition(" ")
+        if kind == "installation":
+            return f"Loading installation: {file.strip()}" if file.strip() else "Failed to load installation"
+        if not name.endswith(".urp"):
+            return f"File not found: {name}"
         self._machine.stop_program()
         self._machine.loaded = name
         return f"Loading program: {name}"
@@ -123,6 +129,17 @@ class Dashboard:
     def _set_role(self, role: str) -> str:
         self._role = role.upper()
         return f"Setting user role: {self._role}"
+
+    def _set_mode(self, text: str) -> str:
+        words = text.split()
+        if words[:2] != ["operational", "mode"] or len(words) != 3 or words[2] not in ("manual", "automatic"):
+            return f"could not understand: 'set {text}'"
+        self._mode = words[2].upper()
+        return f"Setting operational mode: {self._mode}"
+
+    def _clear_mode(self) -> str:
+        self._mode = "NONE"
+        return "No longer controlling the operational mode. Current operational mode: 'NONE'."
 
     def _power(self, mode: RobotMode, done: str, name: str) -> str:
         return done if self._machine.power(mode) else f"Failed to execute: {name}"

@@ -21,6 +21,7 @@ from weldsim.controller.watchdog import Watchdogs
 from weldsim.execution.ur_modes import RobotMode, RuntimeState, SafetyMode
 
 LOG_LINES = 500
+WAITING = "def loaded_program():\n  while True:\n    sync()\n  end\nend\n"  # what a program file does that is played
 
 
 class Machine:
@@ -162,9 +163,17 @@ class Machine:
         return False
 
     def play(self) -> bool:
-        """Let a held program go on; whether there was one and the arm may move."""
-        if self.runtime is RuntimeState.PAUSED and self.can_move:
+        """Let a held program go on, or else start the loaded one; whether there was one and the arm may move.
+
+        Program files are not modelled: one that is loaded waits until it is stopped.
+        """
+        if not self.can_move:
+            return False
+        if self.runtime is RuntimeState.PAUSED:
             self.runtime = RuntimeState.PLAYING
+            return True
+        if self.runtime is RuntimeState.STOPPED and self.loaded and self.upload(WAITING) and self._program is not None:
+            self._program.name = self.loaded
             return True
         return False
 

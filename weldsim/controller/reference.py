@@ -88,10 +88,13 @@ class Reference:
 
     def rest(self) -> None:
         """One period of coming to rest, for who was not commanded."""
-        if not self.resting:
-            self.ramp([0.0] * 6, STOP_DECELERATION)
-        else:
+        if self.resting:
             self.qdd = [0.0] * 6
+            return
+        try:
+            self.ramp([0.0] * 6, STOP_DECELERATION)
+        except MotionFault:  # at the end of a joint's range, or too fast for a stop within it: the brakes
+            self.place(self.q)
 
     def twist(self, tcp: Matrix) -> list[float]:
         """Velocity of the TCP [m/s, rad/s] in the base."""

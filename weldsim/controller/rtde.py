@@ -100,14 +100,19 @@ class RtdeSession:
             self._machine.say(f"RTDE client: {payload[1 : 1 + payload[0]].decode(errors='replace') if payload else ''}")
 
     def _write(self, payload: bytes) -> None:
-        """Apply one packet of inputs; one for a recipe that was refused is passed over.
+        """Apply one packet of inputs; one for a recipe that was refused, or that is too short for its recipe, is passed over.
 
-        ur_rtde sends FK with a TCP of zeros by a recipe that is shorter than what it sends: the rest must not matter.
+        ur_rtde sends FK with a TCP of zeros by a recipe that is shorter than what it sends: the rest must not matter. Its
+        setExternalForceTorque sends less than its recipe has: nothing to hang up for.
         """
         recipe = self._inputs.get(payload[0]) if payload else None
         if recipe is None:
             return
-        recipe.apply(payload[1:], self._machine.io)
+        try:
+            recipe.apply(payload[1:], self._machine.io)
+        except ProtocolError as error:
+            self._machine.say(f"RTDE input passed over: {error}")
+            return
         self._machine.written(recipe.names)
 
     def _set_up_outputs(self, payload: bytes) -> bytes:

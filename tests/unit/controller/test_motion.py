@@ -231,3 +231,25 @@ def test_trapezoid_covers_its_distance_within_its_limits():
 def test_trapezoid_lasts_as_long_as_asked():
     for distance, duration, acceleration in itertools.product((0.01, 1.0), (0.1, 3.0), (0.5, 20.0)):
         assert Trapezoid.lasting(distance, duration, acceleration).duration == pytest.approx(duration)
+
+
+@pytest.mark.parametrize("series", ["cb3", "e"])
+def test_a_joint_driven_into_the_end_of_its_range_stops_there(series):
+    machine = new_machine(series)
+    start = machine.arm.q[0]
+    assert machine.upload("speedj([-3.0, 0, 0, 0, 0, 0], 20.0, 5.0)")
+    for _ in range(round(6.0 / machine.profile.period)):
+        machine.tick()
+    assert machine.safety_mode is SafetyMode.PROTECTIVE_STOP
+    assert "beyond its range" in " ".join(text for _, text in machine.log)
+    assert -2 * np.pi - 0.01 < machine.arm.q[0] < start - 4.0
+    assert max(map(abs, machine.arm.qd)) < 1e-2
+
+
+@pytest.mark.parametrize("line", ["movej([7, -1.3, -1.9, -1.5, 1.57, 0])", "movel([0, -1.3, -1.9, -1.5, 1.57, -6.4])"])
+def test_a_target_beyond_a_joints_range_is_refused_before_it_moves(line):
+    machine = new_machine()
+    run_program(machine, f"def job():\n  {line}\nend")
+    assert "its range is" in machine.log[-1][1]
+    assert machine.safety_mode is SafetyMode.NORMAL
+    np.testing.assert_allclose(machine.arm.q, HOME, atol=1e-3)

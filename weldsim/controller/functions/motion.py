@@ -13,7 +13,7 @@ from weldsim.controller.reference import STOP_DECELERATION
 from weldsim.controller.trapezoid import Trapezoid
 from weldsim.controller.urscript.errors import ScriptError
 from weldsim.controller.urscript.values import number
-from weldsim.kinematics import SPEED_LIMIT
+from weldsim.kinematics import JOINT_LIMIT, SPEED_LIMIT
 
 Motion = Generator[None, None, None]
 Step = Callable[[], object]
@@ -36,7 +36,7 @@ class MotionFunctions:
 
     def movej(self, q: Any, a: float = 1.4, v: float = 1.05, t: float = 0, r: float = 0) -> Motion:
         """Joints to q, or to the joints of a pose, all arriving together; a [rad/s2], v [rad/s], t [s] instead of v."""
-        target = self._joints(q)
+        target = self._within(self._joints(q))
         a, v = min(positive(a, "a"), MAX_ACCELERATION), min(positive(v, "v"), SPEED_LIMIT)
         while True:
             yield from self._settle()
@@ -145,7 +145,14 @@ class MotionFunctions:
 
     def _pose(self, target: Any) -> list[float]:
         pose = six(target, "target")
-        return pose if is_pose(target) else tcp_pose(pose, self._tcp)
+        return pose if is_pose(target) else tcp_pose(self._within(pose), self._tcp)
+
+    def _within(self, q: list[float]) -> list[float]:
+        """Joint angles that are within their ranges. Raises ScriptError."""
+        for joint, angle in enumerate(q):
+            if abs(angle) > JOINT_LIMIT:
+                raise ScriptError(f"joint {joint} cannot turn to {angle:.3f} rad, its range is +-{JOINT_LIMIT:.3f} rad")
+        return q
 
     def _joints_of(self, pose: list[float]) -> list[float]:
         q = pose_joints(pose, self._tcp, self._reference.q)
