@@ -17,10 +17,11 @@ from weldsim.errors import MotionError
 from weldsim.frames import Transform
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rungs import turned
-from weldsim.records import TorchPath
+from weldsim.records import Segment, TorchPath
 
 TURNS = np.deg2rad([s * a for a in (5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 105, 120, 135, 150, 165, 180) for s in (1, -1)])
 LEANS = np.deg2rad([5.0, 10.0, 15.0, 20.0, 30.0])
+LEADS = (0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.10, 0.15)  # [m] tried for lead-in and lead-out
 LOOSE = "clamp"  # names of what can be taken away begin so
 DISTANCES = (0.01, 0.02, 0.03, 0.05, 0.075, 0.10, 0.15, 0.20, 0.25, 0.30, 0.40, 0.50)  # [m] the part is moved by, tried in order
 HEADINGS = 12  # directions on the table
@@ -40,7 +41,7 @@ def fixes_for_path(
         return ()
     if failure.why == "speed":
         return _slower(path, trial, cell, config)
-    found = []
+    found = _lead(path, trial, cell, config) if trial.lead else []
     if not path.roll_free:
         found += _turn(path, trial, cell, config)
     if failure.why == "collision":
@@ -51,6 +52,29 @@ def fixes_for_path(
         found += _move(path, trial, cell, config, tell)
     found += _cut(path, trial, cell, config)
     return tuple(found)
+
+
+def applied(fix: Fix, path: TorchPath, cell: Cell, config: MotionConfig) -> tuple[tuple[TorchPath, ...], Cell, MotionConfig]:
+    """Path, cell and settings with the change made; several paths where the weld is cut."""
+    paths: tuple[TorchPath, ...] = (path,)
+    match fix.kind:
+        case "turn about the wire":
+            paths = (_with(path, X_BT=turned_about_wire(path.X_BT, fix.turn)),)
+        case "lean the torch":
+            paths = (_with(path, X_BT=leaned(path.X_BT, *fix.lean)),)
+        case "move the part":
+            paths, cell = (_with(path, X_BT=shifted(path.X_BT, np.array(fix.move))),), cell.moved(np.array(fix.move))
+        case "slower":
+            paths = (_with(path, speed=np.minimum(path.speed, fix.speed)),)
+        case "take away":
+            for body in fix.body.split(", "):
+                cell = cell.without(body)
+        case "lead-in":
+            config = replace(config, approach=fix.approach)
+        case "cut the weld":
+            edges = [float(path.s[0]), *fix.cut, float(path.s[-1])]
+            paths = tuple(piece(path, np.flatnonzero((path.s >= a - 1e-9) & (path.s <= b + 1e-9))) for a, b in pairwise(edges))
+    return paths, cell, config
 
 
 def _slower(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> tuple[Fix, ...]:
@@ -91,6 +115,19 @@ def _taken_away(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig)
     if not away or not trial.passed:
         return []
     return [Fix(kind="take away", text=f"take {' and '.join(away)} out of the torch's way", body=", ".join(away))]
+
+
+def _lead(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
+    """Lead-in and lead-out of another length: shorter ones first, the nearest to what they are first."""
+    if any(segment in (Segment.APPROACH, Segment.RETRACT) for segment in path.segments):
+        return []  # it brings its own
+    shorter = [length for length in LEADS if length < config.approach - 1e-9]
+    for length in (*reversed(shorter), *(length for length in LEADS if length > config.approach + 1e-9)):
+        if try_path(path, trial.name, cell, replace(config, approach=length)).passed:
+            word = "shorten" if length < config.approach else "lengthen"
+            text = f"{word} the lead-in and lead-out to {1e3 * length:.0f} mm (motion.approach, {1e3 * config.approach:.0f} mm now)"
+            return [Fix(kind="lead-in", text=text, approach=length)]
+    return []
 
 
 def _lean(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:

@@ -124,7 +124,11 @@ def _refused(base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, cell: Cell,
     )
     p = rail.at(np.array([s_first])).p[0]
     return replace(
-        base, verdicts=tuple(verdicts), p_worst=p, q_worst=refusal.q if refusal.q is not None else _last_posture(rungs, first)
+        base,
+        verdicts=tuple(verdicts),
+        p_worst=p,
+        q_worst=refusal.q if refusal.q is not None else _last_posture(rungs, first),
+        lead=bool(lead),
     )
 
 
@@ -154,6 +158,7 @@ def _failed(base: Trial, path: TorchPath, error: MotionError, rungs: Rungs) -> T
         verdicts=_marked(path, {index: (why, str(error))}, after=index),
         q_worst=_last_posture(rungs, at),
         p_worst=path.X_BT.p[index],
+        lead=not float(path.s[0]) + 1e-6 < s < float(path.s[-1]) - 1e-6,
         split=tuple(split) if isinstance(split, tuple) else (),
     )
 

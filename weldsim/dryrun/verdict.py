@@ -55,9 +55,10 @@ class Fix:
         kind: what is changed.  text: the change in words.
         lean: added work angle and travel angle [rad].  body: what is taken away.
         turn: about the wire [rad].  move: of the part, in the base [m].  speed: of the weld [m/s].  cut: arc lengths [m].
+        approach: length of lead-in and lead-out [m], `motion.approach`.
     """
 
-    kind: Literal["turn about the wire", "lean the torch", "take away", "move the part", "slower", "cut the weld"]
+    kind: Literal["turn about the wire", "lean the torch", "take away", "move the part", "slower", "cut the weld", "lead-in"]
     text: str
     lean: tuple[float, float] = (0.0, 0.0)
     body: str = ""
@@ -65,6 +66,7 @@ class Fix:
     move: tuple[float, float, float] = (0.0, 0.0, 0.0)
     speed: float = 0.0
     cut: tuple[float, ...] = ()
+    approach: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,6 +80,7 @@ class Trial:
         q_worst: joint angles at the first failure, to be drawn; None where no posture gets there.  p_worst: its place in B [m].
         points_B: the tip's way, to be drawn.  notes: what else is worth knowing.  length: of the tip's way [m].
         trajectory: the planned motion in full, None where there is none or the program is the robot's own.
+        lead: whether it fails before the weld's first pose or after its last one: on a lead or in the air.
         split: where cutting the weld would help [m].  slowest: least ratio of possible to asked speed, 0 where it is not known.
     """
 
@@ -93,6 +96,7 @@ class Trial:
     notes: tuple[str, ...] = ()
     length: float = 0.0
     trajectory: JointTrajectory | None = None
+    lead: bool = False
     split: tuple[float, ...] = ()
     slowest: float = 0.0
 
@@ -171,6 +175,7 @@ def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
                 "move": list(fix.move),
                 "speed": fix.speed,
                 "cut": list(fix.cut),
+                "approach": fix.approach,
             }
             for fix in fixes
         ],
