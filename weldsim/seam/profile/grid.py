@@ -24,6 +24,7 @@ class Grid:
     count: (m, w) points in each cell.
     shear: (m,) lateral drift of the sight line for each metre inward.
     sight: (m, 3) mean direction of the sight lines, in the cloud's frame; straight down where the viewpoint is unknown.
+    step: between stations [m].
     """
 
     x: Float[ndarray, "w"]
@@ -31,6 +32,7 @@ class Grid:
     count: Float[ndarray, "m w"]
     shear: Float[ndarray, "m"]
     sight: Float[ndarray, "m 3"]
+    step: float
 
     @property
     def sparsity(self) -> float:
@@ -88,4 +90,4 @@ def make_grid(rail: Rail, strip: Strip, parent: Parent, half: float) -> Grid:
     drift = interpolate(at[known], drift[known] / number[known, None], at) if known.any() else np.zeros((m, 2))
     sight = drift[:, :1] * rail.t + drift[:, 1:] * rail.e - rail.n
     centres = (np.arange(width) + 0.5) * DX - half
-    return Grid(centres, mean.reshape(m, width), count.reshape(m, width), drift[:, 1], sight)
+    return Grid(centres, mean.reshape(m, width), count.reshape(m, width), drift[:, 1], sight, rail.step)

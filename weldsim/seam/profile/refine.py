@@ -16,6 +16,7 @@ from weldsim.seam.profile.parent import Parent, fit_parent
 from weldsim.seam.profile.rail import Rail, lay_out, make_rail, shift_rail
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
+from weldsim.seam.profile.strength import Choice
 from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
 from weldsim.seam.profile.views import Blocks
 
@@ -149,7 +150,7 @@ class Measurement:
     """One turn of the fit: what was measured along a rail, and where it says the groove is.
 
     Attributes:
-        offset: (m,) lateral position of the smoothed groove relative to the rail [m].  strength: of that smoothing.
+        offset: (m,) lateral position of the smoothed groove relative to the rail [m].  choice: how it was smoothed.
         doubt: standard deviation of the section's middle [m].
     """
 
@@ -160,7 +161,7 @@ class Measurement:
     track: Track
     inner: float
     offset: Float[ndarray, "m"]
-    strength: float
+    choice: Choice
     doubt: float
 
     @property
@@ -195,13 +196,13 @@ def _measure(
     section = replace(section, middle=0.0)
     if np.count_nonzero(track.weight) < FEWEST_STATIONS:
         return None
-    offset, strength = smoothed(rail, track)
-    return Measurement(rail, parent, grid, section, track, inner, offset, strength, doubt)
+    offset, choice = smoothed(rail, track)
+    return Measurement(rail, parent, grid, section, track, inner, offset, choice, doubt)
 
 
 def _concluded(last: Measurement, bridge: float) -> Fit:
     """The fit: the rail moved onto the smoothed groove, with its standard deviation."""
-    lateral = track_deviation(last.track, last.offset, last.strength)
+    lateral = track_deviation(last.track, last.choice)
     sigma = np.sqrt(lateral**2 + last.parent.sigma**2 + last.doubt**2)
     height = _opening_height(last.parent, last.section, last.offset)
     rail = shift_rail(last.rail, last.offset, height, _slope(last.parent, last.offset), respace=False)

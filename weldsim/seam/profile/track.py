@@ -2,19 +2,27 @@
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from weldsim.frames import unit
 from weldsim.seam.profile.grid import Grid
+from weldsim.seam.profile.parent import TOLERANCE
 from weldsim.seam.profile.rail import Rail
 from weldsim.seam.profile.section import Section
-from weldsim.seam.profile.smooth import choose_strength, deviation, smooth
+from weldsim.seam.profile.smooth import ORDER, deviation, smooth
+from weldsim.seam.profile.strength import Choice, choose, correlation
 
 BLOCK = 8  # stations averaged together to judge how well the section fits
 LATERAL_REACH = 3  # stations on either side that share a look at the lateral position: as far as noise is correlated
 AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
 AROUND = 20  # stations on either side over which the density of the cloud is taken as even
+CAMERA_REACHES = (0.0, 0.002, 0.0035, 0.005, 0.007)  # [m] over which a camera's noise may be alike
+TANGENT = 0.004  # [m] of a line's end that gives the direction in which it goes on
+ENOUGH = 0.35  # of the usual data for a station between two plates
+ENOUGH_ALONE = 0.6  # and for one with a plate on one side, some of whose cells are left out
 LEAST = 0.1  # of the density of the whole seam that tells anything
 
 
@@ -27,14 +35,22 @@ class Track:
         weight: (m,) its information, 0 where the groove was not seen.
         amplitude: (m,) apparent depth over the section's depth: 1 in the groove, 0 beside it; NaN without data.
         local: (m,) the same from the shortest look, noisier.
-    misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
+        reach: stations on either side that share a look at the lateral position.
+        misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
     """
 
     offset: Float[ndarray, "m"]
     weight: Float[ndarray, "m"]
     amplitude: Float[ndarray, "m"]
     local: Float[ndarray, "m"]
+    reach: int
     misfit: float
+
+    @property
+    def core(self) -> slice:
+        """From the first to the last station seen."""
+        seen = np.flatnonzero(self.weight > 0)
+        return slice(int(seen[0]), int(seen[-1]) + 1)
 
 
 def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> Track:
@@ -42,12 +58,15 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
 
     Args:
         flanked: (m,) stations with parent surface on both sides.  held: (m,) on one side at least: there a groove
-            that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
+            that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight; and on
+            towards the end of a plate that is cut off slantwise, with what the camera does not blur into the table.
     """
     model, slope = section.image(grid.x, grid.shear)
     # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
     with np.errstate(invalid="ignore"):
         known = (grid.depth < deepest(section)) & (grid.depth > -0.004)
+    if not flanked.all():
+        known &= flanked[:, None] | ~_beside_other(grid, section, model)
     # Inside the groove a stereo camera is about twice as noisy as on the plate.
     weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
     # Plates at two heights step where there is no groove too.
@@ -58,20 +77,47 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     each = np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)
     least = round(LATERAL_REACH * grid.sparsity)
     ss, mm, sd, _ = _window_sum(each, least).T
-    enough = (mm > 0.35 * _usual(mm)) & (ss > 0)
+    enough = (mm > np.where(flanked, ENOUGH, ENOUGH_ALONE) * _usual(mm)) & (ss > 0)
     amplitude, local = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
+    onward = _carried_on(seen, groove & held)
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
     shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
-    weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)
+    weights = np.where(seen | onward, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)
     if seen.any():
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
-    return Track(
-        section.middle + shift, weights, amplitude, local, _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
-    )
+    misfit = _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
+    return Track(section.middle + shift, weights, amplitude, local, least, misfit)
+
+
+def _beside_other(grid: Grid, section: Section, model: Float[ndarray, "m w"]) -> Bool[ndarray, "m w"]:
+    """Cells within half the camera's window of something that is neither the groove nor the plate."""
+    with np.errstate(invalid="ignore"):
+        other = (grid.depth >= deepest(section)) | (grid.depth <= -0.004)
+        other |= (np.abs(model) < 0.02 * section.depth) & (np.abs(grid.depth) > TOLERANCE)
+    marked = other.astype(np.uint8)
+    # A stray point is no surface.
+    number = cv2.boxFilter(marked, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    marked[number < 3] = 0
+    half = 0.5 * section.blur
+    window = np.ones((2 * round(half / grid.step) + 1, 2 * round(half / (grid.x[1] - grid.x[0])) + 1), np.uint8)
+    return cv2.dilate(marked, window) > 0
+
+
+def _carried_on(seen: Bool[ndarray, "m"], groove: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
+    """Stations with a groove that lead on without a break from the first and the last one seen."""
+    out = np.zeros(len(seen), bool)
+    at = np.flatnonzero(seen)
+    if len(at) == 0:
+        return out
+    broken = np.flatnonzero(~groove[at[-1] + 1 :])
+    out[at[-1] + 1 : at[-1] + 1 + (broken[0] if len(broken) else len(seen))] = True
+    broken = np.flatnonzero(~groove[: at[0]])
+    out[broken[-1] + 1 if len(broken) else 0 : at[0]] = True
+    return out
 
 
 def deepest(section: Section) -> float:
@@ -129,24 +175,61 @@ def _window_sum(values: Float[ndarray, "m k"], reach: int) -> Float[ndarray, "m 
     return total[2 * reach + 1 :] - total[: -2 * reach - 1]
 
 
-def smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], float]:
-    """Lateral offset that puts the rail on the smooth curve through the stations [m], and how strongly it was smoothed.
+def smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], Choice]:
+    """Lateral offset that puts the rail on the smooth curve through the stations [m], and how it was smoothed.
 
-    Beyond the stations seen, the offset stays what it was at the last one.
+    It is the curve's third differences along the rail's lateral axes that shall be small, as on a line or an arc: so a
+    lateral position with the rail's own is added to the offsets before they are smoothed, and taken away after. Beyond the
+    stations seen, the line goes straight on.
     """
-    seen = np.nonzero(track.weight > 0)[0]
-    core = slice(seen[0], seen[-1] + 1)
-    target = rail.points[core] + track.offset[core, None] * rail.e[core]
-    strength = choose_strength(target, track.weight[core])
-    curve = smooth(target, track.weight[core], strength)
-    offset = np.einsum("ij,ij->i", curve - rail.points[core], rail.e[core])
-    return np.pad(offset, (seen[0], len(rail) - seen[-1] - 1), mode="edge"), strength
+    core = track.core
+    bow = _bow(rail.points[core], rail.e[core])
+    values, weight = track.offset[core] + bow, track.weight[core]
+    shared = 2 * track.reach + 1
+    lengths = np.sqrt(shared**2 / 3 + (np.array(CAMERA_REACHES) / rail.step) ** 2)
+    choice = choose(values, weight, lengths, track.reach + 1)
+    offset = smooth(values[:, None], weight, choice.strength)[:, 0] - bow
+    return _led_on(rail, core, offset), choice
 
 
-def track_deviation(track: Track, offset: Float[ndarray, "m"], strength: float) -> Float[ndarray, "m"]:
+def _led_on(rail: Rail, core: slice, offset: Float[ndarray, "k"]) -> Float[ndarray, "m"]:
+    """The lateral offsets of a stretch of stations, and beyond it those that lead straight on [m].
+
+    A few millimetres at most are beyond, and the curvature with which noisy stations end is half noise.
+    """
+    out = np.pad(offset, (core.start, len(rail) - core.stop))
+    reach = min(round(TANGENT / rail.step), len(offset) - 1)
+    if reach == 0:
+        return np.pad(offset, (core.start, len(rail) - core.stop), mode="edge")
+    line = rail.points[core] + offset[:, None] * rail.e[core]
+    for last, before, beyond in (
+        (line[0], line[reach], slice(0, core.start)),
+        (line[-1], line[-1 - reach], slice(core.stop, None)),
+    ):
+        along = unit(last - before)
+        base, e = rail.points[beyond], rail.e[beyond]
+        onto = base - last
+        foot = last + (onto @ along)[:, None] * along
+        out[beyond] = np.einsum("ij,ij->i", foot - base, e)
+    return out
+
+
+def _bow(points: Float[ndarray, "k 3"], e: Float[ndarray, "k 3"]) -> Float[ndarray, "k"]:
+    """A function with the third differences of a rail along its lateral axes [m], but for a parabola."""
+    k = len(points)
+    out = np.zeros(k)
+    if k <= ORDER:
+        return out
+    out[ORDER:] = np.einsum("ij,ij->i", np.diff(points, n=ORDER, axis=0), 0.5 * (e[1:-2] + e[2:-1]))
+    for _ in range(ORDER):
+        out = np.cumsum(out)
+    at = np.linspace(-1.0, 1.0, k)
+    return out - np.polyval(np.polyfit(at, out, ORDER - 1), at)
+
+
+def track_deviation(track: Track, choice: Choice) -> Float[ndarray, "m"]:
     """Standard deviation of the smoothed lateral position at each station [m]."""
-    seen = np.nonzero(track.weight > 0)[0]
-    core = slice(seen[0], seen[-1] + 1)
+    core = track.core
     weight = track.weight[core]
-    sigma = deviation(np.where(weight > 0, (track.offset - offset)[core], 0.0), weight, strength)
-    return np.pad(sigma, (seen[0], len(offset) - seen[-1] - 1), mode="edge")
+    sigma = deviation(weight, choice.strength, correlation(np.arange(len(weight)), choice.length)) * np.sqrt(choice.variance)
+    return np.pad(sigma, (core.start, len(track.weight) - core.stop), mode="edge")
