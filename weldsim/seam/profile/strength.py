@@ -81,7 +81,7 @@ def _blocks(
     k = len(values) // block
     start = (len(values) - k * block) // 2
     part = weights[start : start + k * block].reshape(k, block)
-    held = (part > 0).all(axis=1)
+    held = np.asarray((part > 0).all(axis=1), dtype=bool)
     means = values[start : start + k * block].reshape(k, block).mean(axis=1)
     if held.any():
         means = np.interp(np.arange(k), np.flatnonzero(held), means[held])
