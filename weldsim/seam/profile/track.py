@@ -81,7 +81,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     amplitude, local = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
-    onward = _carried_on(seen, groove & held)
+    onward = np.zeros(len(seen), bool)
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
     shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
     weights = np.where(seen | onward, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)
