@@ -72,6 +72,7 @@ def piece_end(piece: Piece, way: int) -> End:
         turn=turn,
         width=fit.section.width,
         depth=fit.section.depth,
+        skipped=skip,
     )
 
 

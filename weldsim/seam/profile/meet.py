@@ -30,6 +30,7 @@ class End:
         bend: (3,) curvature vector with which the groove arrives [1/m].
         sigma: standard deviation of the point across the seam [m].  turn: of the direction [rad].
         width, depth: of the groove's section [m].
+        skipped: length before the end over which it was carried on unread [m].
     """
 
     point: Float[ndarray, "3"]
@@ -40,6 +41,7 @@ class End:
     turn: float
     width: float
     depth: float
+    skipped: float = 0.0
 
     def carried(self, d: float) -> tuple[Float[ndarray, "3"], Float[ndarray, "3"]]:
         """Point [m] and direction a distance d [m] farther out, as the end bends."""
@@ -47,8 +49,9 @@ class End:
 
     def doubt(self, d: float) -> tuple[float, float]:
         """Standard deviation of that point across the seam [m] and of that direction [rad]."""
-        across = np.hypot(np.hypot(self.sigma, d * self.turn), 0.5 * d**2 * UNKNOWN_BEND)
-        return float(across), float(np.hypot(self.turn, d * UNKNOWN_BEND))
+        unread = self.skipped + d
+        across = np.hypot(np.hypot(self.sigma, d * self.turn), 0.5 * unread**2 * UNKNOWN_BEND)
+        return float(across), float(np.hypot(self.turn, unread * UNKNOWN_BEND))
 
 
 @dataclass(frozen=True, eq=False)

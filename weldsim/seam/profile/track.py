@@ -21,8 +21,7 @@ AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
 AROUND = 20  # stations on either side over which the density of the cloud is taken as even
 CAMERA_REACHES = (0.0, 0.002, 0.0035, 0.005, 0.007)  # [m] over which a camera's noise may be alike
 TANGENT = 0.004  # [m] of a line's end that gives the direction in which it goes on
-ENOUGH = 0.35  # of the usual data for a station between two plates
-ENOUGH_ALONE = 0.6  # and for one with a plate on one side, some of whose cells are left out
+ENOUGH = 0.35  # of the usual data for a station
 LEAST = 0.1  # of the density of the whole seam that tells anything
 
 
@@ -58,8 +57,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
 
     Args:
         flanked: (m,) stations with parent surface on both sides.  held: (m,) on one side at least: there a groove
-            that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight; and on
-            towards the end of a plate that is cut off slantwise, with what the camera does not blur into the table.
+            that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
     """
     model, slope = section.image(grid.x, grid.shear)
     # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
@@ -77,14 +75,13 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     each = np.stack([(weight * term).sum(axis=1) for term in terms], axis=1)
     least = round(LATERAL_REACH * grid.sparsity)
     ss, mm, sd, _ = _window_sum(each, least).T
-    enough = (mm > np.where(flanked, ENOUGH, ENOUGH_ALONE) * _usual(mm)) & (ss > 0)
+    enough = (mm > ENOUGH * _usual(mm)) & (ss > 0)
     amplitude, local = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
-    onward = np.zeros(len(seen), bool)
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
     shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
-    weights = np.where(seen | onward, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)
+    weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)
     if seen.any():
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))
@@ -105,19 +102,6 @@ def _beside_other(grid: Grid, section: Section, model: Float[ndarray, "m w"]) ->
     half = 0.5 * section.blur
     window = np.ones((2 * round(half / grid.step) + 1, 2 * round(half / (grid.x[1] - grid.x[0])) + 1), np.uint8)
     return cv2.dilate(marked, window) > 0
-
-
-def _carried_on(seen: Bool[ndarray, "m"], groove: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
-    """Stations with a groove that lead on without a break from the first and the last one seen."""
-    out = np.zeros(len(seen), bool)
-    at = np.flatnonzero(seen)
-    if len(at) == 0:
-        return out
-    broken = np.flatnonzero(~groove[at[-1] + 1 :])
-    out[at[-1] + 1 : at[-1] + 1 + (broken[0] if len(broken) else len(seen))] = True
-    broken = np.flatnonzero(~groove[: at[0]])
-    out[broken[-1] + 1 if len(broken) else 0 : at[0]] = True
-    return out
 
 
 def deepest(section: Section) -> float:
