@@ -108,6 +108,12 @@ ROWS = {
     "thesis_ratio": Row(
         "how many times longer the published method takes on the same machine", ("ratio",), "", (None,), decimals=0
     ),
+    "dry_run_times": Row(
+        "feasibility and motion plan of a 0.3 m seam, and the search over postures alone, worst of 12",
+        ("check", "ladder"),
+        "s",
+        (5.0, 2.0),
+    ),
     "run_straight": Row("`weldsim run straight`, whole process", ("seconds",), "s", (20.0,), decimals=1),
     "memory": Row("peak memory of `weldsim run straight`", ("bytes",), "GB", (1.5e9,)),
 }

@@ -31,7 +31,7 @@ MOVING = (
 )
 BLOCKS = ("while", "for", "if", "elif", "else", "thread", "switch", "loop")
 SILENT = ("def", "end", "sec", "stopj", "stopl")  # what moves is at rest already
-FURTHEST = 3.0  # [m]
+FURTHEST, LONGEST_TOOL = 3.0, 1.0  # [m] of a pose from the base, of a TCP from the flange
 _CALL = re.compile(r"^(\w+)\s*\((.*)\)$", re.DOTALL)
 _ASSIGN = re.compile(r"^(?:global\s+|local\s+)?(\w+)\s*=\s*([^=].*)$", re.DOTALL)
 _KEYWORD = re.compile(r"^(\w+)\s*=\s*([^=].*)$", re.DOTALL)
@@ -188,12 +188,20 @@ class _Reader:
         pose = self._value(number, (plain or list(keyed.values()) or [""])[0])
         if not isinstance(pose, tuple) or len(pose[1]) != 6:
             raise self.wrong(number, "set_tcp: p[x, y, z, rx, ry, rz] is needed")
+        p, turn = (float(np.linalg.norm(part)) for part in (pose[1][:3], pose[1][3:]))
+        if p > LONGEST_TOOL:
+            raise self.wrong(number, f"set_tcp: {p:.4g} m from the flange (limit {LONGEST_TOOL:g} m): looks like millimetres")
+        if turn > 2 * np.pi + 1e-6:
+            raise self.wrong(number, f"set_tcp: rotation vector of length {turn:.4g} (limit 2 pi): looks like degrees")
         self.said_tcp = True
         if self.fixed is None:
             self.mount = Transform.from_rotation_vector("FT", np.array(pose[1][3:]), np.array(pose[1][:3]))
 
     def _sleep(self, number: int, _: str, plain: list[str], keyed: dict[str, str]) -> None:
-        self.pauses += self._number(number, (plain or list(keyed.values()) or ["0"])[0])
+        t = self._number(number, (plain or list(keyed.values()) or ["0"])[0])
+        if t < 0:
+            raise self.wrong(number, f"sleep: {t:g} s must not be negative")
+        self.pauses += t
 
     def _output(self, _number: int, _: str, plain: list[str], keyed: dict[str, str]) -> None:
         words = [*plain, *keyed.values()]
