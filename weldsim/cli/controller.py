@@ -25,7 +25,9 @@ class Controller(ConfigOptions):
     """Serve, order a fault, or ask for the state."""
 
     fault: tyro.conf.Positional[Literal[FaultName, "none"]] = "none"
-    """With fault: which. recover ends the program, lifts every stop and releases the brakes."""
+    """With fault: which. protective-stop, emergency-stop: arm stopped, program held or ended. stall: silent for --seconds while
+    program and arm go on. link-drop: every client hung up on for --seconds. foreign-program: somebody else's program runs.
+    local-control, remote-control: clients may only look, or act (e-Series). recover: program ended, stops lifted, brakes off."""
 
     profile: Literal["cb3", "e"] = "cb3"
     """CB3 3.15 at 125 Hz or e-Series 5.11 at 500 Hz."""
@@ -66,6 +68,9 @@ class Controller(ConfigOptions):
         if self.verbose:
             machine = server.machine
             machine.on_message = lambda text: print(f"{machine.t:9.3f}  {text}", file=sys.stderr, flush=True)
+        if not self.host.startswith("127."):
+            warning = f"weldsim: {self.host} may be reached from other machines, and whoever reaches it moves the arm"
+            print(warning, file=sys.stderr, flush=True)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: server.stop())
         if self.json:

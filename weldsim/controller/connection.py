@@ -1,12 +1,13 @@
 """One client's socket: never waited for, and never sent half a message."""
 
 import socket
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 RECEIVE_SIZE = 65536
 BACKLOG_LIMIT = 1 << 20  # [byte] a client this far behind is given up
 
 
+@runtime_checkable
 class Session(Protocol):
     """What answers one client."""
 

@@ -5,7 +5,6 @@ comes and counts from the next period on.
 """
 
 import gc
-import os
 import selectors
 import socket
 import time
@@ -59,7 +58,7 @@ class Server:
             listener = socket.create_server((self.host, port))
         except OSError as error:
             self.close()
-            reason = os.strerror(error.errno) if error.errno else error
+            reason = str(error.strerror or error).partition(" (")[0]
             raise InputError(
                 f"controller: {self.host} port {port}: {reason}; another address, 127.0.0.2 say, holds a second controller",
                 host=self.host,
