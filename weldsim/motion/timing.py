@@ -19,7 +19,7 @@ from weldsim.motion.rail import Rail
 from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import Segment
 
-BLOCK = 0.005  # [m] a weld slows down over whole blocks of this length
+BLOCK = 0.00125  # [m] a weld slows down over whole blocks of this length
 RAMPING, BENDING, TWISTING = 0.35, 0.20, 0.45  # shares of a joint's jerk: of ramps, of ramps on bends, of changing bends
 LOOK = 0.01  # [rad] of the leading joint between looks at the tip's speed in the air
 CHORD = 1.001  # the tip's way is longer than chords over so small a turn by less
@@ -142,16 +142,35 @@ def _speed_limits(
     # Inside the weld the slower neighbour counts; a lead has its own speed at its far end alone.
     pick = np.minimum if path.segment == Segment.WELD else np.maximum
     asked = pick(rail.speed[i], rail.speed[i + 1])
-    u = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 9)
-    rate, bend = np.abs(path.spline(u, 1)).max(axis=(1, 2)), np.abs(path.spline(u, 2)).max(axis=(1, 2))
+    rate, bend, twist = (_greatest(path, edges, order) for order in (1, 2, 3))
     left = HEADROOM * config.joint_acceleration_limit - rate * tip.acceleration
     allowed = np.minimum(HEADROOM * config.joint_speed_limit / np.maximum(rate, 1e-9), np.sqrt(left / np.maximum(bend, 1e-9)))
     # The third derivative of q(s(t)) has three terms, q' by jerk, 3 q'' by speed and acceleration, q''' by the cube of speed:
     # each with its share of the joint's jerk.
-    twist, jerk = np.abs(path.spline(u, 3)).max(axis=(1, 2)), HEADROOM * config.joint_jerk_limit
+    jerk = HEADROOM * config.joint_jerk_limit
     allowed = np.minimum(allowed, np.cbrt(TWISTING * jerk / np.maximum(twist, 1e-9)))
     allowed = np.minimum(allowed, BENDING * jerk / np.maximum(3 * bend * tip.acceleration, 1e-9))
     return edges, np.minimum(asked, allowed), asked
+
+
+def _greatest(path: JointPath, edges: Float[ndarray, "b_plus_1"], order: int) -> Float[ndarray, "b"]:
+    """Greatest size of any joint's derivative of that order in each block.
+
+    The spline is cubic between its knots, which lie closer together where the path bends: its third derivative is constant
+    there, its second greatest at one of them. Samples that are even along the block would miss what lies between.
+    """
+    knots = path.spline.x
+    u = np.unique(
+        np.concatenate(
+            [knots, (knots[1:] + knots[:-1]) / 2, edges, *((edges[1:] * k + edges[:-1] * (9 - k)) / 9 for k in range(1, 9))]
+        )
+    )
+    u = u[(u >= edges[0]) & (u <= edges[-1])]
+    size = np.abs(path.spline(u, order)).max(axis=1)
+    if order == 3:  # at a knot it is that of the interval that begins there: the one that ends there counts too
+        size = np.maximum(size, np.concatenate([size[:1], size[:-1]]))
+    first = np.searchsorted(u, edges[:-1])
+    return np.maximum(np.maximum.reduceat(size, first), size[np.searchsorted(u, edges[1:])])
 
 
 def _arc_profile(
