@@ -254,17 +254,20 @@ def judge_refusal(done: Job, case: Case, cell: Cell, config: CellConfig) -> tupl
     faults = [
         f"nothing reaches s = {1e3 * s:.1f} mm, before it" for s in before if not len(postures(rail.at(np.array([s]))[0], case))
     ]
-    here = postures(rail.at(np.array([at]))[0], case)
-    if why == "unreachable":
-        faults += ["a posture reaches it"] if len(here) else []
-        return why, tuple(faults), True
-    if why in ("collision", "singular"):
-        free = [q for q in here if dexterity(q) > SINGULAR * 1.05 and not touching(cell, q)]
-        faults += [f"{len(free)} of {len(here)} postures are free"] if free else []
-        faults += [] if len(here) else ["nothing reaches it"]
-        return why, tuple(faults), True
+    if why in ("unreachable", "collision", "singular"):
+        # What is claimed of the place must hold there or just beyond: a coarser look gives up a little earlier.
+        claims = [_claim(why, postures(rail.at(np.array([min(s, rail.s[-1])]))[0], case), cell) for s in (at, at + FIRST)]
+        return why, (*faults, *(() if "" in claims else claims[:1])), True
     # No sweep: by brute force there is none either, or it could not be told.
     return why, tuple(faults), not sweep_exists(rail, case, cell, at)
+
+
+def _claim(why: str, here: ndarray, cell: Cell) -> str:
+    """What is wrong with what was said of a place that has these postures; nothing where it is true."""
+    if why == "unreachable":
+        return "a posture reaches it" if len(here) else ""
+    free = sum(dexterity(q) > SINGULAR * 1.05 and not touching(cell, q) for q in here)
+    return "nothing reaches it" if not len(here) else f"{free} of {len(here)} postures are free" if free else ""
 
 
 def postures(X_BT: Transform, case: Case, rolls: int = ROLLS) -> ndarray:
