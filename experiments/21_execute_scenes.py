@@ -114,10 +114,11 @@ def executed(scene_name: str, robot: str, file: Path, speed: float, seed: int) -
 def measured(log: ExecutionLog, done: Job) -> dict[str, float]:
     """Figures of a log [SI]: the measured tip from the planned line; differences of what was sent; where the arc burnt."""
     assert done.report is not None
-    h = log.period
-    speed = np.diff(log.q_cmd, axis=0) / h
+    # A state that nobody had time to look at repeats the command before it in the log: commands are told by what is new.
+    h, q = log.period, log.q_cmd[np.concatenate([[True], (np.diff(log.q_cmd, axis=0) != 0).any(axis=1)])]
+    speed = np.diff(q, axis=0) / h
     jerk, acceleration = np.diff(speed, n=2, axis=0) / h**2, np.diff(speed, axis=0) / h
-    torch = np.linalg.norm(np.diff(torch_pose(log.q_cmd).p, axis=0), axis=1) / h
+    torch = np.linalg.norm(np.diff(torch_pose(q).p, axis=0), axis=1) / h
     weld_rows = np.array([segment == Segment.WELD for segment in log.segments])
     burnt, asked = log.s_cmd[log.arc_on], log.s_cmd[weld_rows]
     stray = float("inf") if not len(burnt) or (log.arc_on & ~weld_rows)[:-1].any() else 0.0

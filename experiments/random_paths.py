@@ -266,8 +266,10 @@ def _claim(why: str, here: ndarray, cell: Cell) -> str:
     """What is wrong with what was said of a place that has these postures; nothing where it is true."""
     if why == "unreachable":
         return "a posture reaches it" if len(here) else ""
+    if not len(here):  # where the arm is stretched out, singular ends in out of reach
+        return "" if why == "singular" else "nothing reaches it"
     free = sum(dexterity(q) > SINGULAR * 1.05 and not touching(cell, q) for q in here)
-    return "nothing reaches it" if not len(here) else f"{free} of {len(here)} postures are free" if free else ""
+    return f"{free} of {len(here)} postures are free" if free else ""
 
 
 def postures(X_BT: Transform, case: Case, rolls: int = ROLLS) -> ndarray:
