@@ -19,7 +19,7 @@ PYTHON_AT_LEAST = (3, 11)
 IMPORT_TIMEOUT = 60.0  # [s] a library that takes longer hangs
 
 # Import names that are not the distribution's name with - as _
-_IMPORT_NAMES = {"opencv-python-headless": "cv2"}
+_IMPORT_NAMES = {"opencv-python-headless": "cv2", "ur_rtde": "rtde_control"}
 
 # Debian and Ubuntu packages of the shared libraries that the wheels expect to find
 _APT_PACKAGES = {
@@ -60,6 +60,7 @@ def diagnose() -> tuple[Check, ...]:
     return (
         check_python(sys.version_info[:3]),
         *libraries,
+        check_ur_client(),
         rendering.result(),
         check_current_folder(),
         check_writable("cache folder", Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")),
@@ -101,6 +102,14 @@ def check_library(distribution: str) -> Check:
     named = os.environ.get("MUJOCO_GL") and _failure_of(f"import os; del os.environ['MUJOCO_GL']; import {module}") is None
     remedy = _unset_remedy() if named else remedy_for(distribution, failure)
     return Check(name=distribution, ok=False, detail=f"{version}: {failure}", remedy=remedy)
+
+
+def check_ur_client() -> Check:
+    """Whether a UR arm, or the virtual controller, can be commanded; an extra, so that doing without it is no failure."""
+    found = check_library("ur_rtde")
+    if found.detail == "not installed":
+        return Check(name="ur_rtde", ok=True, detail="not installed: only a UR arm needs it", remedy="pip install ur_rtde")
+    return found
 
 
 def remedy_for(distribution: str, failure: str) -> str:

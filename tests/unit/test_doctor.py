@@ -2,6 +2,7 @@
 
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 from weldsim import doctor
@@ -26,6 +27,17 @@ def test_a_library_that_is_not_installed_says_how_to_install_it():
     check = doctor.check_library("no-such-library-as-this")
     assert not check.ok
     assert check.remedy == "pip install no-such-library-as-this"
+
+
+def test_the_ur_client_is_an_extra(monkeypatch):
+    def without(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor.metadata, "version", without)
+    check = doctor.check_ur_client()
+    assert check.ok
+    assert "not installed" in check.detail
+    assert check.remedy == "pip install ur_rtde"
 
 
 def test_a_missing_system_library_is_named_with_its_package(tmp_path, monkeypatch):

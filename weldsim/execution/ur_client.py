@@ -3,21 +3,26 @@
 It holds the ur_rtde clients, so that whatever they do can be ended by killing it. Messages are JSON lists, one a packet, over
 the socket whose number it is given:
 
-    ["servo", n, q, arc]   answered by ["servo", n, done, time, why]; time is the host's monotonic clock [s]
+    ["servo", n, q, arc]   joins a queue and is answered as it is sent on: ["servo", n, done, time, why], host's monotonic time [s]
     ["stop", n]            arc off, then rest: ["stop", n, done]
     ["quit", n]            the same, then the program on the controller ends: ["quit", n, true], and the process ends
+
+Targets leave the queue one a control period, by this process's own clock: who owns it may be `buffer` seconds late at times without
+the arm noticing. The queue's length shows how the owner's pace, which is the controller's, differs; the clock follows it.
 
 Once it can be used it says ["ready", tcp]; why it cannot be, ["failed", text]. When the other side hangs up it stops arm and arc
 and ends. When a stream of servo messages breaks off for `stall` seconds it stops arm and arc, and says ["stall", gap].
 """
 
 import json
+import math
 import os
 import select
 import signal
 import socket
 import sys
 import time
+from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -25,6 +30,7 @@ from dataclasses import asdict, dataclass
 from weldsim.execution.ur_rtde import Control, Signals, open_control, open_signals
 
 MAX_MESSAGE = 4096  # [byte]
+PULL = 0.1  # most that a period is stretched or shortened, when the queue is empty or twice as long as it should be
 KICKS = 4  # a watchdog period: commands that keep it quiet while nothing moves
 
 
@@ -34,13 +40,15 @@ class ClientSettings:
 
     Attributes:
         host: of the controller.  period: of control [s].  arc_output: standard digital output.
-        lookahead [s], gain: of servoJ.  watchdog_rate [Hz].  stall [s].  stop_deceleration [rad/s2].
+        buffer [s]: length of the queue.  lookahead [s], gain: of servoJ.  watchdog_rate [Hz].  stall [s].
+        stop_deceleration [rad/s2].
         tcp: X_FT as a pose [m, rad].  payload [kg], payload_cog [m].
     """
 
     host: str
     period: float
     arc_output: int
+    buffer: float
     lookahead: float
     gain: float
     watchdog_rate: float
@@ -63,6 +71,9 @@ class Client:
         self._arc = False
         self._streaming, self._stalled, self._kicking = False, False, True
         self._heard = 0.0
+        self._queue: deque[tuple[int, list[float], bool]] = deque()
+        self._depth = max(1, round(settings.buffer / settings.period))
+        self._due = math.inf  # when the next target leaves the queue
 
     def prepare(self) -> None:
         """Arc off, TCP, payload and watchdog set. Raises RuntimeError for what the controller refuses."""
@@ -83,7 +94,11 @@ class Client:
         """Serve until told to quit, or until the other side has gone."""
         idle = 1.0 / self._settings.watchdog_rate / KICKS
         while True:
-            patience = self._heard + self._settings.stall - time.monotonic() if self._streaming else idle
+            now = time.monotonic()
+            if now >= self._due:
+                self._send_on(now)
+            silent = self._heard + self._settings.stall
+            patience = min(self._due, silent) - now if self._streaming else idle
             readable, _, _ = select.select([self._channel], [], [], max(0.0, patience))
             if readable:
                 message = self._receive()
@@ -94,10 +109,10 @@ class Client:
                 if not self._handle(message):
                     return
             elif self._streaming:
-                gap = time.monotonic() - self._heard
-                self._stalled = True
-                self._come_to_rest()
-                self._say("stall", gap)
+                if (gap := time.monotonic() - self._heard) >= self._settings.stall:
+                    self._stalled = True
+                    self._come_to_rest()
+                    self._say("stall", gap)
             elif self._kicking:
                 self._kicking = self._control.kickWatchdog()
 
@@ -105,7 +120,7 @@ class Client:
         """Whether to go on."""
         what, number = message[0], message[1]
         if what == "servo":
-            self._servo(number, message[2], message[3])
+            self._queue_up(number, message[2], message[3])
             return True
         done = self._come_to_rest()
         self._stalled = False
@@ -114,12 +129,22 @@ class Client:
         self._say(what, number, done)
         return what != "quit"
 
-    def _servo(self, number: int, q: list[float], arc: bool) -> None:
-        settings = self._settings
+    def _queue_up(self, number: int, q: list[float], arc: bool) -> None:
         self._heard = time.monotonic()
         if self._stalled:
             self._say("servo", number, False, self._heard, "stall")
             return
+        self._queue.append((number, q, arc))
+        if not self._streaming:
+            self._streaming, self._due = True, self._heard + (self._depth - 1) * self._settings.period
+
+    def _send_on(self, now: float) -> None:
+        """The target that is due; nothing where the owner is later than the queue was long: the arm waits for it."""
+        excess = max(-1.0, min(1.0, (len(self._queue) - self._depth) / self._depth))
+        self._due = max(self._due + self._settings.period * (1.0 - PULL * excess), now)
+        if not self._queue:
+            return
+        settings, (number, q, arc) = self._settings, self._queue.popleft()
         if not arc:
             self._switch(False)
         done = self._control.servoJ(q, 0.0, 0.0, settings.period, settings.lookahead, settings.gain)
@@ -127,8 +152,12 @@ class Client:
             self._switch(True)
         elif not done:
             self._switch(False)
-        self._streaming = done
-        self._say("servo", number, done, self._heard, "" if done else "program")
+            self._drop_queue()
+        self._say("servo", number, done, now, "" if done else "program")
+
+    def _drop_queue(self) -> None:
+        self._queue.clear()
+        self._streaming, self._due = False, math.inf
 
     def _switch(self, on: bool) -> None:
         if on != self._arc:
@@ -138,7 +167,8 @@ class Client:
     def _come_to_rest(self) -> bool:
         """Arc off, then rest; whether the controller did it."""
         self._signals.setStandardDigitalOut(self._settings.arc_output, False)  # whatever it was thought to be
-        self._arc, self._streaming = False, False
+        self._arc = False
+        self._drop_queue()
         return bool(self._control.servoStop(self._settings.stop_deceleration))
 
     def _receive(self) -> list | None:

@@ -15,6 +15,7 @@ PERIODS: dict[Series, float] = {"cb3": 1 / 125, "e": 1 / 500}
 
 RANGES = {
     "arc_output": (0, 7),
+    "buffer": (0.0, 0.1),
     "lookahead": (0.03, 0.2),
     "gain": (100.0, 2000.0),
     "watchdog_rate": (2.0, 50.0),
@@ -51,6 +52,8 @@ class UrConfig:
     arc_output: int = 0
     """Standard digital output that strikes the arc. On a real controller its action at program end, in the installation's I/O
     set-up, must be `Low when not running`: that alone drops it when this computer or the cable dies."""
+    buffer: Second = 0.024
+    """How long a target waits before it is sent on, so that a hitch of this computer does not reach the arm."""
     lookahead: Second = 0.03
     """Smoothing time of servoJ; the arm follows about this much late. 0.03 to 0.2 s."""
     gain: float = 300.0

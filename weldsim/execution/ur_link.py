@@ -83,6 +83,7 @@ def client_settings(config: UrConfig, period: float) -> ClientSettings:
         host=config.host,
         period=period,
         arc_output=config.arc_output,
+        buffer=config.buffer,
         lookahead=config.lookahead,
         gain=config.gain,
         watchdog_rate=config.watchdog_rate,

@@ -35,8 +35,8 @@ from weldsim.execution.ur_stream import LinkError, Sample
 from weldsim.records import Event, RobotFacts, RobotState
 
 FOLLOW_SPAN = 0.15  # [s] beyond the look-ahead in which the controller's target must have passed one of our commands
-ARC_DELAY = 0.06  # [s] after which an output that was switched on is reported on
-BEHIND = 0.012  # [s] of lateness that is caught up with, two periods at least; more is not
+FOLLOW_EVERY = 0.02  # [s] between two looks at that
+ARC_DELAY = 0.06  # [s] after which an output that was sent on is reported on
 GRACE = 0.02  # [s] for what came in while this process was held up
 TAKEN = 2000  # states kept for `passed_over`: 4 s at 500 Hz
 SILENT = 0.5  # [s] without a state after which `state` says that there is no link
@@ -59,10 +59,12 @@ class UrRobot(Robot):
         self._link: Link | None = None
         self._sample: Sample | None = None
         self._origin, self._served = 0.0, -math.inf
+        self._judged, self._judge_every = 0, 1
         self._arc, self._arc_asked = False, 0
         self._trouble: Trouble | None = None
         self._events: list[Event] = []
         self._sent: deque[list[float]] = deque()
+        self._told: tuple[Sample, RobotState] | None = None
         self._taken: deque[Sample] = deque(maxlen=TAKEN)
 
     @property
@@ -85,7 +87,8 @@ class UrRobot(Robot):
         self._link, self._trouble, self.period = link, None, link.period
         self._origin, self._sample = link.first.timestamp, link.first
         self._events, self._arc, self._arc_asked = [], False, 0
-        self._sent = deque(maxlen=math.ceil((self.config.lookahead + FOLLOW_SPAN) / self.period))
+        self._sent = deque(maxlen=math.ceil((self.config.buffer + self.config.lookahead + FOLLOW_SPAN) / self.period))
+        self._judge_every = max(1, round(FOLLOW_EVERY / self.period))
         self._note("connection", f"{link.identity.model} {link.identity.serial}, software {link.identity.software}")
         if not link.identity.program.startswith("STOPPED"):
             self._note("connection", f"stopped what ran before: {link.identity.program}")
@@ -115,7 +118,10 @@ class UrRobot(Robot):
         if self._link is not None and time.monotonic() - self._served > self._behind * self.period:
             self._read_all(self._link)
         silent = time.monotonic() - self._last.arrived > max(SILENT, self.config.silence)
-        return robot_state(self._last, self._origin, "disconnected" if silent or self._link is None else mode_word(self._last))
+        mode = "disconnected" if silent or self._link is None else mode_word(self._last)
+        if self._told is None or self._told[0] is not self._last or self._told[1].mode != mode:  # asked for several times a period
+            self._told = self._last, robot_state(self._last, self._origin, mode)
+        return self._told[1]
 
     def torque(self) -> Float[ndarray, "6"] | None:
         """As measured, where the software reports it (5.23 and newer); its older figures are currents, or the model's own."""
@@ -202,10 +208,11 @@ class UrRobot(Robot):
                 )
                 return Trouble("stall", text, refusal.gap, config.stall)
             return self._why_refused(link)
-        if trouble is None and self._arc_asked * self.period > ARC_DELAY and not self.arc:
+        if trouble is None and self._arc_asked * self.period > self.config.buffer + ARC_DELAY and not self.arc:
             text = f"output {config.arc_output} is off though the arc was asked for: something else switches it; connect again"
             trouble = Trouble("arc", text, False, True)
-        if trouble is None and len(self._sent) == self._sent.maxlen:
+        self._judged += 1
+        if trouble is None and self._judged % self._judge_every == 0 and len(self._sent) == self._sent.maxlen:
             off = follow_distance(sample.target_q, self._sent)
             if off > config.follow_limit:
                 text = f"the arm is {off:.3f} rad from every command of the last moments (limit {config.follow_limit:g} rad)"
@@ -265,8 +272,8 @@ class UrRobot(Robot):
 
     @property
     def _behind(self) -> int:
-        """Periods of lateness that are caught up with."""
-        return max(2, round(BEHIND / self.period))
+        """Periods of lateness that are caught up with: as many as the client's queue bridges."""
+        return max(2, round(self.config.buffer / self.period))
 
     @property
     def _last(self) -> Sample:
