@@ -168,7 +168,7 @@ class UrRobot(Robot):
             self._arc_asked = self._arc_asked + 1 if self._arc else 0
             self._await_next(link)
         except ClientError as gone:
-            self._give_up(link, Trouble("client", f"{gone}; connect again"))
+            self._give_up(link, self._why_gone(link, gone))
         except LinkError as lost:
             self._give_up(link, Trouble("link", f"{lost}; connect again"))
         if trouble := self._judge(link):
@@ -230,6 +230,19 @@ class UrRobot(Robot):
         except LinkError as lost:
             return Trouble("link", f"{lost}; connect again")
         return Trouble("program", "the control program takes no commands; connect again")
+
+    def _why_gone(self, link: Link, gone: ClientError) -> Trouble:
+        """The client library dies of a lost link, sooner than we see it, and waits without end for a silent controller."""
+        try:
+            while link.stream.wait(EVIDENCE / 4):
+                self._take(link.stream.take())
+                if trouble := safety_trouble(self._last):
+                    return trouble
+                if self._last.arrived > time.monotonic() - self.period:
+                    break
+        except LinkError as lost:
+            return Trouble("link", f"{lost}; connect again")
+        return Trouble("client", f"{gone}; connect again")
 
     def _give_up(self, link: Link, trouble: Trouble) -> NoReturn:
         """Arc off and rest asked for at once; then the reason, as exactly as it can be found out."""
