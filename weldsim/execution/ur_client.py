@@ -30,6 +30,7 @@ from dataclasses import asdict, dataclass
 from weldsim.execution.ur_rtde import Control, Signals, open_control, open_signals
 
 MAX_MESSAGE = 4096  # [byte]
+LAST_WORDS = 2.0  # [s] to stop the arm in, once nobody owns this process any longer
 PULL = 0.1  # most that a period is stretched or shortened, when the queue is empty or twice as long as it should be
 KICKS = 4  # a watchdog period: commands that keep it quiet while nothing moves
 
@@ -103,6 +104,8 @@ class Client:
             if readable:
                 message = self._receive()
                 if message is None:
+                    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+                    signal.setitimer(signal.ITIMER_REAL, LAST_WORDS)  # ends the process, whatever the library waits for by then
                     self._come_to_rest()
                     self._control.stopScript()
                     return

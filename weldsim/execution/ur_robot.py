@@ -203,9 +203,7 @@ class UrRobot(Robot):
         trouble = safety_trouble(sample) or program_trouble(sample, None)
         if trouble is None and (refusal := link.client.refusal) is not None:
             if refusal.reason == "stall":
-                text = (
-                    f"{refusal.gap:.3f} s without a command (limit {config.stall:g} s): arc and arm were stopped; stop, then go on"
-                )
+                text = f"{refusal.gap:.3f} s without a command (limit {config.stall:g} s): arc and arm were stopped; connect again"
                 return Trouble("stall", text, refusal.gap, config.stall)
             return self._why_refused(link)
         if trouble is None and self._arc_asked * self.period > self.config.buffer + ARC_DELAY and not self.arc:
