@@ -114,8 +114,8 @@ class Client:
             elif self._streaming:
                 if (gap := time.monotonic() - self._heard) >= self._settings.stall:
                     self._stalled = True
+                    self._say("stall", gap)  # first, or the owner sees the arc go off and does not know why
                     self._come_to_rest()
-                    self._say("stall", gap)
             elif self._kicking:
                 self._kicking = self._control.kickWatchdog()
 
