@@ -97,6 +97,7 @@ def executed(scene_name: str, robot: str, file: Path, speed: float, seed: int) -
     if done.log is None or done.stopped is not None:
         failure = done.trial.failure if done.trial is not None else None
         row["broken"] = [f"not welded: {done.stopped or (failure.text if failure else 'no reason')}"]
+        row["controller"] = events[-6:]
     if done.log is not None:
         row["figures"] = measured(done.log, done)
         row["arc"] = [event.text for event in done.log.events if event.kind == "arc"]
@@ -121,7 +122,9 @@ def measured(log: ExecutionLog, done: Job) -> dict[str, float]:
     torch = np.linalg.norm(np.diff(torch_pose(q).p, axis=0), axis=1) / h
     weld_rows = np.array([segment == Segment.WELD for segment in log.segments])
     burnt, asked = log.s_cmd[log.arc_on], log.s_cmd[weld_rows]
-    stray = float("inf") if not len(burnt) or (log.arc_on & ~weld_rows)[:-1].any() else 0.0
+    # An output is reported off a few periods after it was told: what counts is how far the torch is by then, and never in the air.
+    air_rows = np.array([segment == Segment.AIR for segment in log.segments])
+    stray = float("inf") if not len(burnt) or (log.arc_on & air_rows).any() else 0.0
     ends = max(abs(burnt[0] - asked[0]), abs(burnt[-1] - asked[-1])) if len(burnt) else float("inf")
     return {
         "p95": float(done.report.tracking_p95 or np.inf),
@@ -194,7 +197,12 @@ def main() -> int:
                 row = executed(scene, robot, file, options.speed, options.seed)
                 rows.append(row)
                 shown = ", ".join(f"{w} {k * row['figures'][n]:.3g} {u}" for n, (w, k, u) in WORDS.items() if n in row["figures"])
-                print(f"{scene}, {robot}: {shown}; {'; '.join(row['broken']) or 'holds'}; {row.get('arc')}", flush=True)
+                print(
+                    f"{scene}, {robot}: {shown}; {'; '.join(row['broken']) or 'holds'}; {row.get('arc')}",
+                    *row.get("controller", ()),
+                    sep="\n    ",
+                    flush=True,
+                )
     text = markdown(rows, options.speed)
     print(text)
     options.out.mkdir(exist_ok=True)
