@@ -5,10 +5,12 @@ import pytest
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.curves import arc_length, project
-from weldsim.records import PointCloud, Seam
+from weldsim.curves import arc_length, project, resample
+from weldsim.records import PointCloud, Seam, Threshold
 from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.atlas import Atlas
 from weldsim.seam.profile.find import find_seams_profile
+from weldsim.seam.profile.valley import CoarseLine
 
 CONFIG = ProfileConfig()
 HALF, WIDTH, DEPTH, SPACING = 0.10, 0.014, 0.008, 0.0014
@@ -77,8 +79,8 @@ def test_grooves_that_stop_well_before_the_edge_stay_two() -> None:
     assert len(found.seams) == 2
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_branches_end_where_they_meet(seed: int) -> None:
+def branches(seed: int) -> tuple[PointCloud, Float[ndarray, "3"]]:
+    """Three grooves of 85 mm from one junction in a plate, and their azimuths [rad]."""
     rng = np.random.default_rng(seed)
     x, y = (v.ravel() for v in np.meshgrid(np.arange(-HALF, HALF, SPACING), np.arange(-HALF, HALF, SPACING)))
     x, y = x + rng.uniform(-3e-4, 3e-4, x.size), y + rng.uniform(-3e-4, 3e-4, y.size)
@@ -89,12 +91,35 @@ def test_branches_end_where_they_meet(seed: int) -> None:
         arm = np.maximum(0.0, 1 - np.abs(across) / (WIDTH / 2)) * DEPTH * (along > 0)
         groove = np.maximum(groove, np.where(along < 0.085, arm, 0.0))
     points = np.stack([x, y, -groove + rng.normal(0, 1e-4, len(x))], axis=1)
-    found = find_seams_profile(PointCloud(points=points, viewpoints=np.array([[0.02, 0.01, 0.4]])), CONFIG)
-    assert len(found.seams) == 3
-    for seam in found.seams:
+    return PointCloud(points=points, viewpoints=np.array([[0.02, 0.01, 0.4]])), angles
+
+
+def check_branches(seams: tuple[Seam, ...], angles: Float[ndarray, "3"]) -> None:
+    assert len(seams) == 3
+    for seam in seams:
         ends = np.linalg.norm(seam.points_B[[0, -1]], axis=1)
         azimuth = np.arctan2(*seam.points_B[-int(ends.argmax())][1::-1])
         assert np.cos(angles - azimuth).max() > np.cos(0.01), "along one of the arms"
         assert ends.min() < 0.001, "at the junction"
         assert 0.080 < ends.max() < 0.088
         assert arc_length(seam.points_B)[-1] < 0.09
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_branches_end_where_they_meet(seed: int) -> None:
+    cloud, angles = branches(seed)
+    check_branches(find_seams_profile(cloud, CONFIG).seams, angles)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_coarse_line_may_run_on_into_a_groove_already_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    cloud, angles = branches(seed)
+    tips = 0.08 * np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
+
+    def coarse(start: Float[ndarray, "3"], stop: Float[ndarray, "3"]) -> CoarseLine:
+        points = resample(np.stack([start, np.zeros(3), stop]), 0.001)
+        return CoarseLine(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)), 1.0, 1.0)
+
+    lines = [coarse(tips[0], tips[1]), coarse(tips[2], 0.6 * tips[1])]
+    monkeypatch.setattr(Atlas, "coarse_lines", lambda *_: (lines, Threshold(name="", value=1e-3, unit="m", noise=1e-4)))
+    check_branches(find_seams_profile(cloud, CONFIG).seams, angles)

@@ -69,6 +69,9 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
             continue
         if any(_covers(piece, line) for piece in found):
             continue
+        own = _own_part(line, found)
+        if arc_length(line[own])[-1] >= 0.8 * config.min_length:
+            line, normals = line[own], normals[own]
         fit = grow(atlas, line, normals, config)
         reason = "no parent surface on both sides at one level"
         if fit is not None:
@@ -120,9 +123,21 @@ def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:
 
 def _covers(piece: Piece, line: Float[ndarray, "k 3"]) -> bool:
     """Whether most of a line lies within a groove already found."""
-    inside = piece.fit.rail.points[station_mask(piece.fit, piece.span)]
-    distance, _, _ = project(line, inside)
-    return bool(np.mean(distance < 0.6 * piece.fit.section.width) > 0.5)
+    return bool(np.mean(_distance(piece, line) < 0.6 * piece.fit.section.width) > 0.5)
+
+
+def _own_part(line: Float[ndarray, "k 3"], found: list[Piece]) -> slice:
+    """A coarse line without the ends that lie along grooves already found: at a junction it may have run on into another."""
+    own = np.ones(len(line), bool)
+    for piece in found:
+        own &= _distance(piece, line) >= 0.6 * piece.fit.section.width
+    at = np.flatnonzero(own)
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) > 1 else slice(0, 1)
+
+
+def _distance(piece: Piece, line: Float[ndarray, "k 3"]) -> Float[ndarray, "k"]:
+    """Of a line's points from a groove [m]."""
+    return project(line, piece.fit.rail.points[station_mask(piece.fit, piece.span)])[0]
 
 
 def _mark_region(region: Int[ndarray, "n"], number: int, atlas: Atlas, fit: Fit, span: tuple[float, float]) -> None:
