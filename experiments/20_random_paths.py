@@ -15,6 +15,7 @@ from pathlib import Path
 from weldsim.dryrun.cell import empty_cell
 
 sys.path.insert(0, str(Path(__file__).parent))
+from figures import record
 from random_paths import KINDS, START, Outcome, attempt, random_case
 
 RESULTS = Path(__file__).parent / "results"
@@ -54,6 +55,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--out", type=Path, default=RESULTS)
+    parser.add_argument("--record", action="store_true", help="write the figures of README.md too")
     options = parser.parse_args()
     cell, outcomes = empty_cell(START), []
     for seed in range(options.first, options.first + options.count):
@@ -67,6 +69,8 @@ def main() -> int:
     print(text)
     options.out.mkdir(exist_ok=True)
     (options.out / "20_random_paths.md").write_text(text)
+    if options.record and options.count >= 200:
+        record("random_jobs", "python experiments/20_random_paths.py --record", count=sum(bool(each.faults) for each in outcomes))
     return 1 if any(outcome.faults for outcome in outcomes) else 0
 
 

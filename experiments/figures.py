@@ -103,6 +103,21 @@ ROWS = {
         "mm",
         (0.2e-3,),
     ),
+    **{
+        f"execute_{key}": Row(f"five scenes welded through {name}: tip from the planned path, worst p95", ("p95",), "mm", (0.3e-3,))
+        for key, name in (
+            ("sim", "the simulated arm"),
+            ("cb3", "ur_rtde and a virtual CB3 controller"),
+            ("e", "ur_rtde and a virtual e-Series controller"),
+        )
+    },
+    "random_jobs": Row(
+        "200 random jobs, some infeasible: moved before being refused, broke a limit, or wrongly judged",
+        ("count",),
+        "",
+        (0,),
+        decimals=0,
+    ),
     "plan_stages": Row("cloud to path, 307,200 points, stages alone, 2 cores", ("seconds",), "s", (0.4,)),
     "plan_process": Row("`weldsim plan` on that cloud, whole process", ("seconds",), "s", (3.0,)),
     "thesis_ratio": Row(
@@ -116,6 +131,9 @@ ROWS = {
     ),
     "run_straight": Row("`weldsim run straight`, whole process", ("seconds",), "s", (20.0,), decimals=1),
     "memory": Row("peak memory of `weldsim run straight`", ("bytes",), "GB", (1.5e9,)),
+    "run_cuboid": Row("`weldsim run cuboid`, whole process", ("seconds",), "s", (60.0,), decimals=1),
+    "regress": Row("`weldsim regress`, 3 seeds, every scene by both methods, two jobs", ("seconds",), "s", (240.0,), decimals=0),
+    "regress_ratio": Row("how many times as fast as with one job", ("ratio",), "", (1.6,), True),
 }
 
 
