@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from weldsim.config import CellConfig, load_scene
+from weldsim.config import CellConfig, load_scene, paced_for
 from weldsim.controller.ask import ask
 from weldsim.dryrun.cell import scene_cell
 from weldsim.dryrun.read import read_program
@@ -46,7 +46,6 @@ RESULTS = Path(__file__).parent / "results"
 SCENES = ("straight", "curve", "cylinder", "cuboid", "y")
 ROBOTS = ("sim", "cb3", "e")
 # The wire turns so far at an edge of the box that joint limits slow the weld there: wanted here, a failure of a dry run otherwise.
-LEAST_SPEED = 0.1
 LIMITS = {"p95": 0.3e-3, "joint_speed": 3.0, "joint_acceleration": 10.0, "joint_jerk": 350.0, "torch_speed": 0.25, "ends": 1e-3}
 WORDS = {
     "p95": ("tip p95", 1e3, "mm"),
@@ -76,8 +75,8 @@ def controller(profile: str, scene: str, speed: float, host: str) -> Iterator[st
 
 def executed(scene_name: str, robot: str, file: Path, speed: float, seed: int) -> dict[str, Any]:
     """One scene welded by one robot, measured."""
-    scene, config = load_scene(scene_name), CellConfig()
-    config = replace(config, motion=replace(config.motion, least_speed=LEAST_SPEED))
+    scene = load_scene(scene_name)
+    config = paced_for(CellConfig(), scene)
     program = read_program(file, speed=config.path.speed)
     findings, _ = file_findings(program, file)
     cell, job = scene_cell(scene), JobConfig(arc=True)

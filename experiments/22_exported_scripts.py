@@ -51,7 +51,7 @@ RECIPE = {
     "runtime_state": "UINT32",
     "safety_mode": "INT32",
 }
-SLOW_CORNERS = "motion.least_speed=0.1"  # the wire turns so far at an edge of the box that joint limits slow the weld there
+SLOW_CORNERS = "motion.least_speed=0.1"  # joint limits slow the weld at the corners of the thesis's program
 PLAYING, NORMAL, ARC = 2, 1, 1  # runtime state, safety mode, bit of digital output 0
 LIMITS = {"off": 0.2e-3, "missed": 0.2e-3, "speed": 0.02, "start": 0.2e-3, "end": 0.2e-3}
 WINDOW = 0.1  # [s] over which speed is measured
@@ -178,12 +178,12 @@ def exported(name: str, folder: Path) -> tuple[Path, TorchPath] | str:
         data = os.environ.get("WELDSIM_DATA")
         if data is None:
             return "WELDSIM_DATA is not set"
-        source, around = Path(data) / "real" / "thesis_paths" / "ur_y_shape.csv", ["--empty"]
+        source, around = Path(data) / "real" / "thesis_paths" / "ur_y_shape.csv", ["--empty", "--set", SLOW_CORNERS]
     else:
         source, around = folder / name / "path.json", ["--scene", name]
         if run_command(["run", name, "--out", str(folder / name), "--json"]) > 1:
             return "no path was planned"
-    if run_command(["dry-run", str(source), *around, "--no-fix", "--export", str(script), "--set", SLOW_CORNERS, "--json"]) != 0:
+    if run_command(["dry-run", str(source), *around, "--no-fix", "--export", str(script), "--json"]) != 0:
         return "the dry run fails"
     return script, read_program(source).paths[0]
 

@@ -39,6 +39,7 @@ __all__ = [
     "load_config",
     "load_scene",
     "load_toml",
+    "paced_for",
     "structure",
     "to_json",
 ]
@@ -85,8 +86,16 @@ class CellConfig:
 def limits_for(config: CellConfig, scene: "SceneConfig") -> ReportConfig:
     """The limits of the verdict on a scene: its own where it has some and the config leaves the general ones as they are."""
     general, report = ReportConfig(), config.report
-    own = {name: value for name, value in vars(scene.limits).items() if value is not None}
+    own = {name: value for name, value in vars(scene.limits).items() if value is not None and hasattr(report, name)}
     return replace(report, **{name: value for name, value in own.items() if getattr(report, name) == getattr(general, name)})
+
+
+def paced_for(config: CellConfig, scene: "SceneConfig | None") -> CellConfig:
+    """The config with the scene's own `least_speed`, where it has one and the config leaves the general one as it is."""
+    own, general = None if scene is None else scene.limits.least_speed, MotionConfig().least_speed
+    if own is None or config.motion.least_speed != general:
+        return config
+    return replace(config, motion=replace(config.motion, least_speed=own))
 
 
 def load_toml(path: str | Path) -> dict[str, Any]:

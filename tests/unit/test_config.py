@@ -9,7 +9,19 @@ from typing import Literal
 
 import pytest
 
-from weldsim.config import CellConfig, apply_overrides, describe, digest, load_config, load_toml, structure, to_json
+from weldsim.config import (
+    CellConfig,
+    apply_overrides,
+    describe,
+    digest,
+    limits_for,
+    load_config,
+    load_scene,
+    load_toml,
+    paced_for,
+    structure,
+    to_json,
+)
 from weldsim.errors import ConfigError
 from weldsim.quantity import Metre, MetrePerSecond, Radian
 
@@ -226,3 +238,17 @@ def test_reading_a_config_loads_no_heavy_library() -> None:
     code = f"import sys, weldsim.config; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_scene_has_limits_of_its_own_and_the_config_goes_before_them() -> None:
+    cuboid, straight = load_scene("cuboid"), load_scene("straight")
+    general = CellConfig()
+    assert limits_for(general, straight) == general.report
+    assert limits_for(general, cuboid).max == cuboid.limits.max != general.report.max
+    assert limits_for(load_config(overrides=["report.max=3 mm"]), cuboid).max == 0.003
+
+    assert paced_for(general, None) == paced_for(general, straight) == general
+    assert paced_for(general, cuboid).motion.least_speed == cuboid.limits.least_speed
+    assert paced_for(load_config(overrides=["motion.least_speed=0.5"]), cuboid).motion.least_speed == 0.5
+    with pytest.raises(ConfigError, match="least_speed"):
+        load_scene("cuboid", overrides=["limits.least_speed=1.5"])

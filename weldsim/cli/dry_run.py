@@ -80,9 +80,11 @@ class DryRunCommand(ConfigOptions):
         check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file))
         config, q_start = self.cell(), None if self.start is None else joint_angles(self.start)
 
+        from weldsim.config import paced_for
         from weldsim.dryrun.read import read_program
         from weldsim.dryrun.run import dry_run
 
+        config = paced_for(config, None if self.scene is None else self.scene_of(self.scene))
         program = read_program(
             self.file, tool=self.tool, base=self.base, speed=config.path.speed, roll_free=True if self.roll else None
         )

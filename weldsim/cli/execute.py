@@ -72,11 +72,13 @@ class Execute(ConfigOptions):
         program = self._program(config)
 
         from weldsim.clock import Clock
+        from weldsim.config import paced_for
         from weldsim.welding.folder import job_document, write_job
         from weldsim.welding.seams import file_findings
 
         findings, cloud = file_findings(program, self.file)
         scene = None if self.scene is None else self.scene_of(self.scene)
+        config = paced_for(config, scene)
         cell, known = self._cell(scene, config)
         with progress() as tell:
             clock = Clock(tell)

@@ -102,11 +102,14 @@ class LimitsConfig:
         mean: cross-track distance from the known seam, mean [m].
         p95: the same, 95th percentile [m].
         max: the same, greatest [m].
+        least_speed: share of the asked welding speed to which joint limits may slow the weld in places: round an edge, say,
+            where the wire swings from one face to the next.
     """
 
     mean: Metre | None = None
     p95: Metre | None = None
     max: Metre | None = None
+    least_speed: float | None = None
 
     def __post_init__(self) -> None:
         require_within(self, {name: (0.0, 1.0) for name, value in vars(self).items() if value is not None}, "limits")
