@@ -19,14 +19,19 @@ from typing import Any
 import numpy as np
 
 from weldsim.config import CellConfig
+from weldsim.frames import Transform
+from weldsim.mounts import KINECT_V2, X_WB, X_WC_KINECT
 from weldsim.regression import Regression, regress
 from weldsim.report.metrics import offsets
 from weldsim.scene.files import scene_names
+from weldsim.sensor.base import Label, View
 
 RESULTS = Path(__file__).parent / "results"
 PARTS = {"cylinder": ("6.3", "6.4", 40.15), "cuboid": ("6.5", "6.6", 61.11), "y": ("6.7", "6.8", 25.65)}
 CLAIMED = 0.002  # [m] the abstract: errors under 2 mm
 OFFSET = 0.0035  # [m] rms of table 6.2, the error of a whole view
+MARKER, NEARER = 0.08, 0.05  # [m] side of the marker; nearer to the camera than the empty table
+WHOLE = 0.8  # of a marker's pixels, for it to be taken as seen
 Row = dict[str, Any]
 
 
@@ -35,12 +40,55 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def guidance(tables: Row) -> Row:
-    """Table 6.1: the overhead Kinect's position of a marker against the arm's own, eight poses."""
+def guidance(tables: Row, seeds: int) -> Row:
+    """Table 6.1: the overhead Kinect's position of a marker against the arm's own, eight places.
+
+    Ours: a level square before the table, found as what is nearer than the empty table; the middle of its points. The camera's
+    place is known exactly and no arm is in its way, so this is the share of the error that is the camera's own.
+    """
     pairs = tables["kinect_guidance_6_1"]
     distance = np.linalg.norm(np.array(pairs["measured"]) - np.array(pairs["true"]), axis=1)
+    found = np.array([[marker_found(place, seed) for seed in range(seeds)] for place in np.array(pairs["true"])])
+    error = np.linalg.norm(found - np.array(pairs["true"])[:, None], axis=2)
+    seen = np.isfinite(error).all(axis=1)
     row: Row = {"table": "6.1", "figure": "Kinect guidance, rms of eight positions", "unit": "mm"}
-    return row | {"recomputed": rms(distance), "ours": None, "why": "marker guidance by the simulated Kinect is not built"}
+    note = (
+        f"6.1, ours: the simulated Kinect alone, its place known exactly (a hand-eye error adds to it), at {seen.sum()} of the"
+        " eight positions; at the others the marker is not wholly in its view and beyond its least distance of 0.5 m"
+    )
+    return row | {"recomputed": rms(distance), "ours": rms(error[seen]) if seen.any() else None, "note": note}
+
+
+def marker_found(place: np.ndarray, seed: int) -> np.ndarray:
+    """Where the simulated Kinect has the middle of a marker that is at `place` (3,) in the base [m]; NaN where it sees none."""
+    X_BC = X_WB.inverse() @ X_WC_KINECT
+    empty, seen = (kinect_points(at, X_BC, seed) for at in (None, place))
+    nearer = empty[..., 2] - seen[..., 2] > NEARER  # along the optical axis, which looks straight down
+    expected = (MARKER * KINECT_V2.fx / np.median(seen[nearer, 2])) ** 2 if nearer.any() else np.inf
+    whole = np.count_nonzero(nearer) > WHOLE * expected
+    return X_BC.points(np.median(seen[nearer], axis=0)) if whole else np.full(3, np.nan)
+
+
+def kinect_points(place: np.ndarray | None, X_BC: Transform, seed: int) -> np.ndarray:
+    """Points (h, w, 3) in the Kinect's frame [m] of the table and, at a place, a marker."""
+    import mujoco
+
+    from weldsim.sensor.exact import TwinScene
+    from weldsim.sensor.kinect import KinectConfig
+    from weldsim.sensor.time_of_flight import KinectV2
+
+    boxes = '<geom type="box" size="1 1 0.01" pos="0 0 -0.01"/>'
+    if place is not None:
+        x, y, z = place
+        boxes += f'<geom type="box" size="{MARKER / 2} {MARKER / 2} 0.002" pos="{x} {y} {z - 0.002}"/>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{boxes}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    labels = np.full(model.ngeom, Label.PART, np.uint8)
+    base = Transform("WB", np.eye(3), np.zeros(3))  # the table's frame is B here
+    camera = KinectV2(TwinScene(model=model, data=data, X_WB=base, labels=labels), KINECT_V2, KinectConfig(), seed=seed)
+    depth = camera.capture(View(X_BC=X_BC)).frame.depth
+    return KINECT_V2.rays() * depth[..., None]
 
 
 def depth(tables: Row, seeds: int) -> list[Row]:
@@ -152,7 +200,7 @@ def main() -> int:
     tables = json.loads((Path(folder) / "thesis_tables.json").read_text())
     there = [name for name in options.parts if name in scene_names()]
     outcome = regress(there, seeds=options.seeds, jobs=options.jobs, config=CellConfig()) if there else None
-    rows = [guidance(tables), *depth(tables, options.seeds)]
+    rows = [guidance(tables, options.seeds), *depth(tables, options.seeds)]
     for name in options.parts:
         rows += part(name, tables, outcome if name in there else None)
     if outcome is not None:
