@@ -36,7 +36,9 @@ from weldsim.records import KnownSeam, PointCloud
 from weldsim.report.metrics import across, known_offsets
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.refine import Fit, refine
-from weldsim.seam.profile.smooth import STRENGTHS, choose_strength, smooth
+from weldsim.seam.profile.smooth import smooth
+from weldsim.seam.profile.strength import STRENGTHS, choose
+from weldsim.seam.profile.track import CAMERA_REACHES, LATERAL_REACH
 from weldsim.seam.thesis import mls
 from weldsim.seam.thesis.config import ThesisConfig
 from weldsim.seam.thesis.find import find_seams_thesis
@@ -59,6 +61,7 @@ WAVELENGTHS = (0.060, 0.100, 0.150, 0.300)
 RADIUS = 0.100  # [m] the least of the sines, and the arc's
 TRACK_NOISE = (0.1e-3, 0.3e-3, 0.6e-3)
 CORRELATION, STATIONS, STEP = 3.5, 240, 0.001
+SHOWN = STRENGTHS[STRENGTHS <= 1e8]  # beyond, a line of this length is a parabola already
 Row = dict[str, Any]
 
 
@@ -210,19 +213,22 @@ def smoothed_curves(draws: int) -> list[Row]:
     rng, rows = np.random.default_rng(0), []
     weights, inner = np.ones(STATIONS), slice(20, -20)
     columns = track_noise(rng, draws)
+    lengths = np.hypot((2 * LATERAL_REACH + 1) / np.sqrt(3), np.array(CAMERA_REACHES) / STEP)  # as the finder has them
     for name, track in curves().items():
         crest = np.argmax(np.abs(track[inner])) + 20
-        biases = {k: smooth(track[:, None], weights, k)[:, 0] - track for k in STRENGTHS}
-        scatters = {k: smooth(columns, weights, k) for k in STRENGTHS}
+        biases = {k: smooth(track[:, None], weights, k)[:, 0] - track for k in SHOWN}
+        scatters = {k: smooth(columns, weights, k) for k in SHOWN}
         for sigma in TRACK_NOISE:
-            chosen, errors, lost = [], [], []
+            chosen, errors, lost, left = [], [], [], []
             for column in columns.T:
                 seen = track + sigma * column
-                strength = choose_strength(seen[:, None], weights)
+                strength = choose(seen, weights, lengths, LATERAL_REACH + 1).strength
                 found = smooth(seen[:, None], weights, strength)[:, 0]
+                bias = smooth(track[:, None], weights, strength)[:, 0] - track
                 chosen.append(strength)
                 errors.append(rms((found - track)[inner]))
-                lost.append(-float(biases[strength][crest] * np.sign(track[crest])))
+                lost.append(-float(bias[crest] * np.sign(track[crest])))
+                left.append(rms(bias[inner]))
             rows.append(
                 {
                     "track": name,
@@ -230,10 +236,10 @@ def smoothed_curves(draws: int) -> list[Row]:
                     "strength": float(np.exp(np.median(np.log(chosen)))),
                     "crest": float(abs(track[crest])),
                     "crest_lost": float(np.mean(lost)),
-                    "bias": float(np.mean([rms(biases[k][inner]) for k in chosen])),
+                    "bias": float(np.mean(left)),
                     "error": float(np.mean(errors)),
                     "raw": sigma * rms(columns[inner]),
-                    "by_strength": [[k, rms(biases[k][inner]), sigma * rms(scatters[k][inner])] for k in STRENGTHS],
+                    "by_strength": [[k, rms(biases[k][inner]), sigma * rms(scatters[k][inner])] for k in SHOWN],
                 }
             )
     return rows
@@ -301,7 +307,7 @@ def markdown(rows: list[Row], tracks: list[Row]) -> str:
             p = row["published"]
             cells = " | ".join("-" if p[k] is None else f"{1e3 * p[k]:.2f}" for k in ("mean", "p95"))
             lines.append(f"| {row['scene']} | {row['noise']} | {1e3 * row['radius']:g} mm | {cells} | {p['share']:.2f} |")
-    lines += ["", "Curve smoothing, strength chosen by cross-validation.", ""]
+    lines += ["", "Curve smoothing, strength chosen by likelihood under correlated noise.", ""]
     lines += ["| track | noise | strength | crest | crest lost | bias rms | error rms | unsmoothed rms |", "|---" * 8 + "|"]
     for row in tracks:
         cells = [f"{1e3 * row[name]:.3f}" for name in ("crest", "crest_lost", "bias", "error", "raw")]

@@ -51,7 +51,6 @@ RECIPE = {
     "runtime_state": "UINT32",
     "safety_mode": "INT32",
 }
-SLOW_CORNERS = "motion.least_speed=0.1"  # joint limits slow the weld at the corners of the thesis's program
 PLAYING, NORMAL, ARC = 2, 1, 1  # runtime state, safety mode, bit of digital output 0
 LIMITS = {"off": 0.2e-3, "missed": 0.2e-3, "speed": 0.02, "start": 0.2e-3, "end": 0.2e-3}
 WINDOW = 0.1  # [s] over which speed is measured
@@ -178,7 +177,7 @@ def exported(name: str, folder: Path) -> tuple[Path, TorchPath] | str:
         data = os.environ.get("WELDSIM_DATA")
         if data is None:
             return "WELDSIM_DATA is not set"
-        source, around = Path(data) / "real" / "thesis_paths" / "ur_y_shape.csv", ["--empty", "--set", SLOW_CORNERS]
+        source, around = Path(data) / "real" / "thesis_paths" / "ur_y_shape.csv", ["--empty"]
     else:
         source, around = folder / name / "path.json", ["--scene", name]
         if run_command(["run", name, "--out", str(folder / name), "--json"]) > 1:

@@ -81,8 +81,9 @@ class MotionConfig:
     """Height of the table top in the base frame."""
     clearance: Metre = 0.08
     """Distance kept between the arm's centre lines and the table, and between the torch and the arm."""
-    least_speed: float = 0.99
-    """Share of the asked welding speed below which a dry run calls a weld that joint limits make slower a failure."""
+    least_speed: float = 0.5
+    """Share of the asked welding speed below which a dry run calls a weld that joint limits make slower a failure; any slowing
+    is told."""
     return_home: bool = True
     """Whether the arm goes back to where it started."""
 

@@ -2,7 +2,8 @@
 
 Coarse: valleys of the cloud's chart (`chart`, `valley`). Fine: each candidate is measured along its own rail
 (`refine`), ended (`ends`) and judged (`judge`). No threshold is typed: the coarse one comes from the valley image's own
-background, the smoothing from cross-validation, the blur of the camera's support window from the groove's own shape.
+background, the smoothing from the likelihood of correlated noise, the blur of the camera's support window from the
+groove's own shape.
 """
 
 import numpy as np
