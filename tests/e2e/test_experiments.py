@@ -25,10 +25,13 @@ def script(name: str) -> ModuleType:
     return module
 
 
+@pytest.mark.render
 def test_errors_of_the_thesis_are_recomputed_from_its_pairs(real_data):
     tables = json.loads((real_data.parent / "thesis_tables.json").read_text())
     module = script("10_thesis_tables")
-    assert module.guidance(tables)["recomputed"] == pytest.approx(32.8e-3, abs=0.05e-3)
+    guidance = module.guidance(tables, seeds=1)
+    assert guidance["recomputed"] == pytest.approx(32.8e-3, abs=0.05e-3)
+    assert 0 < guidance["ours"] < 2e-3
     first, second = module.depth(tables, seeds=1)
     assert first["recomputed"] == pytest.approx(3.5e-3, abs=0.05e-3)
     assert first["ours"] < 1e-3 < second["ours"]
@@ -37,7 +40,7 @@ def test_errors_of_the_thesis_are_recomputed_from_its_pairs(real_data):
         assert time["recomputed"] == pytest.approx(seconds, abs=0.1)
         assert distance["recomputed"] == pytest.approx(pair * 1e-3, abs=0.06e-3)
         assert cross["recomputed"] == pytest.approx(across * 1e-3, abs=0.35e-3)
-    assert "| 6.1 |" in module.markdown([module.guidance(tables), first], 1)
+    assert "| 6.1 |" in module.markdown([guidance, first], 1)
 
 
 @pytest.mark.render
