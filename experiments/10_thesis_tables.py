@@ -66,7 +66,7 @@ def marker_found(place: np.ndarray, seed: int) -> np.ndarray:
     nearer = empty[..., 2] - seen[..., 2] > NEARER  # along the optical axis, which looks straight down
     expected = (MARKER * KINECT_V2.fx / np.median(seen[nearer, 2])) ** 2 if nearer.any() else np.inf
     whole = np.count_nonzero(nearer) > WHOLE * expected
-    return X_BC.points(np.median(seen[nearer], axis=0)) if whole else np.full(3, np.nan)
+    return X_BC.points(np.median(seen[nearer], axis=0)[None])[0] if whole else np.full(3, np.nan)
 
 
 def kinect_points(place: np.ndarray | None, X_BC: Transform, seed: int) -> np.ndarray:
