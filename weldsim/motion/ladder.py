@@ -30,6 +30,8 @@ TRAVEL, ROLLING, STARTING, STANDING = (
     4.0,
 )  # weights of joint travel, roll travel, way from the start, mean node cost
 SMOOTHINGS = (3.0, 1.5, 0.7, 0.0)  # rungs over which the rotation about the wire is smoothed, tried in order
+COMFORT = 0.6  # [rad] from a joint's end stop at which it begins to count
+CRAMPED = 3 * np.pi  # [rad] of travel from the start worth taking so as not to weld at a stop: a whole turn from a third of COMFORT
 
 Nodes = Float[ndarray, "r 8 v"]
 
@@ -148,14 +150,13 @@ def _forward(
     round_[list(wound)] = False
     lifted = q[:, :, :, None, :] + offsets
     share = STANDING / len(q)
-    with np.errstate(invalid="ignore"):
-        out = np.abs(lifted[..., list(wound)]).max(axis=-1, initial=0.0) > limit
-    node = share * np.where(out, np.inf, np.broadcast_to(cost[..., None], out.shape))
+    furthest = np.abs(np.nan_to_num(lifted[..., list(wound)])).max(axis=-1, initial=0.0)
+    node = share * np.where(furthest > limit, np.inf, cost[..., None] + _cramped(limit - furthest))
     way = 0.0 if np.isnan(q_start).any() else STARTING * np.nan_to_num(_turns(lifted[0] - q_start, round_))
-    total, came = [node[0] + way], [(np.zeros(node.shape[1:], np.int8),) * 2]
+    total, came = [node[0] + way], [(np.zeros(node.shape[1:], np.int16),) * 2]
     twist = min(TWIST, (q.shape[1] - 1) // 2)
     for i in range(1, len(q)):
-        best, shift_of, turn_of = np.full(node.shape[1:], np.inf), *(np.zeros(node.shape[1:], np.int8) for _ in range(2))
+        best, shift_of, turn_of = np.full(node.shape[1:], np.inf), *(np.zeros(node.shape[1:], np.int16) for _ in range(2))
         for shift, v in product(range(-twist, twist + 1), range(len(offsets))):
             step = _turns(lifted[i] - np.roll(lifted[i - 1], shift, axis=0)[:, :, v : v + 1], round_)
             rolling = ROLLING * abs(shift) * 2 * np.pi / q.shape[1]
@@ -170,6 +171,11 @@ def _forward(
 def _turns(difference: Float[ndarray, "*n 6"], round_: Bool[ndarray, "6"]) -> Float[ndarray, "*n"]:
     """The greatest turn of any joint [rad], the short way round for the joints of `round_`."""
     return np.abs(np.where(round_, (difference + np.pi) % (2 * np.pi) - np.pi, difference)).max(axis=-1)
+
+
+def _cramped(room: Float[ndarray, "*n"]) -> Float[ndarray, "*n"]:
+    """What it costs to come as near to an end stop as `room` [rad]."""
+    return CRAMPED * np.clip(1.0 - room / COMFORT, 0.0, 1.0)
 
 
 def _descended(rungs: Rungs, search: _Climb) -> tuple[Float[ndarray, "w"], int, Float[ndarray, "w 6"]]:
@@ -191,7 +197,7 @@ def _descended(rungs: Rungs, search: _Climb) -> tuple[Float[ndarray, "w"], int, 
 def _within(
     q: Float[ndarray, "w 6"], q_start: Float[ndarray, "6"], wound: tuple[int, ...], limit: float
 ) -> tuple[Float[ndarray, "w 6"] | None, list[int]]:
-    """The way without jumps of whole turns, within limits and near q_start; or None and the joints that do not fit."""
+    """The way without jumps of whole turns, away from the stops and near q_start; or None and the joints that do not fit."""
     out, over = q.copy(), []
     for joint in set(range(6)) - set(wound):
         path = np.unwrap(q[:, joint])
@@ -199,7 +205,9 @@ def _within(
         if not fits:
             over.append(joint)
             continue
-        out[:, joint] = path + min(fits, key=lambda turn: abs(path[0] + turn - q_start[joint]))
+        ways = path + np.array(fits)[:, None]
+        dear = np.abs(ways[:, 0] - q_start[joint]) + _cramped(limit - np.abs(ways).max(axis=1))
+        out[:, joint] = ways[dear.argmin()]
     return (None, over) if over else (out, [])
 
 

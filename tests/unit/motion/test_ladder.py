@@ -97,6 +97,18 @@ def test_whole_turns_are_chosen_so_that_the_stops_are_never_reached() -> None:
     assert np.allclose(np.diff(hold.q[:, 5]), np.deg2rad(20), atol=1e-9)
 
 
+@pytest.mark.parametrize(("start", "turns"), [(170.0, 0), (330.0, 0), (349.0, -1), (-349.0, 1)])
+def test_a_weld_that_would_end_near_a_stop_is_begun_a_whole_turn_away(start: float, turns: int) -> None:
+    # At 349 deg the stop is 11 deg off: where the arm stands, but a whole turn back leaves half a turn on either side.
+    principal = (start + 180) % 360 - 180
+    angles = np.deg2rad(np.full((25, 1), principal))
+    q_start = np.zeros(6)
+    q_start[5] = np.deg2rad(start)
+    hold = climb(_ladder(angles, np.zeros(angles.shape)), q_start, X_FT, MotionConfig())
+    assert hold is not None
+    assert np.allclose(hold.q[:, 5], np.deg2rad(start + 360 * turns), atol=1e-9)
+
+
 def test_a_joint_that_would_run_into_its_stop_goes_another_way() -> None:
     # One rotation winds the joint up by two turns and a half, dear ones beside it stay where they are.
     w, r = 41, 12
