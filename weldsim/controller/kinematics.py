@@ -10,8 +10,8 @@ import ur_analytic_ik
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.controller.poses import Matrix, inverse_matrix, matrix_of, pose_of
 from weldsim.kinematics import JOINT_LIMIT, link_frames
+from weldsim.urscript.poses import Matrix, inverse_matrix, matrix_of, pose_of
 
 _IK = ur_analytic_ik.ur5.inverse_kinematics  # pyright: ignore[reportAttributeAccessIssue] - compiled, untyped
 

@@ -8,17 +8,17 @@ from collections.abc import Callable, Iterable, Mapping
 
 from weldsim.controller.arm import Arm
 from weldsim.controller.config import ControllerConfig
-from weldsim.controller.poses import matrix_of
 from weldsim.controller.profile import Profile
 from weldsim.controller.reference import Reference
 from weldsim.controller.registers import Registers
 from weldsim.controller.snapshot import Snapshot
 from weldsim.controller.tool import Tool
-from weldsim.controller.urscript.compiler import Compiled, compile_program
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.program import Program
 from weldsim.controller.watchdog import Watchdogs
 from weldsim.execution.ur_modes import RobotMode, RuntimeState, SafetyMode
+from weldsim.urscript.compiler import Compiled, compile_program
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.poses import matrix_of
+from weldsim.urscript.program import Program
 
 LOG_LINES = 500
 WAITING = "def loaded_program():\n  while True:\n    sync()\n  end\nend\n"  # what a program file does that is played

@@ -10,8 +10,8 @@ import numpy as np
 
 from weldsim.controller.errors import MotionFault
 from weldsim.controller.kinematics import jacobian
-from weldsim.controller.poses import Matrix
 from weldsim.kinematics import JOINT_LIMIT, SPEED_LIMIT
+from weldsim.urscript.poses import Matrix
 
 STOP_DECELERATION = 12.0  # [rad/s2] of the leading joint when nobody commands any longer: rest from full speed in 0.26 s
 SPEED_MARGIN = 1.05  # what a numerical derivative may exceed the limit by

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from weldsim.controller.poses import Matrix
+from weldsim.urscript.poses import Matrix
 
 
 @dataclass(eq=False)

@@ -1,40 +1,31 @@
-"""The motions of a URScript program: movej, movel, movep, servoj with literal or named targets, set_tcp, sleep, outputs.
+"""The motions of a URScript program in their order: it is run with functions that write down what they are asked for.
 
-A program whose motions depend on loops, conditions or sensors cannot be told line by line and is refused where it begins to.
+Functions, variables, loops and poses that are computed are the program's own affair; one whose motions depend on an input, a
+register or a thread cannot be told beforehand and is refused where it begins to.
 """
 
-import ast
-import re
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
-from weldsim.dryrun.program import Motion, Program
+from weldsim.dryrun.program import Command, Motion, Program
+from weldsim.dryrun.robot_state import RobotState
+from weldsim.dryrun.script_names import ASKING, MOVING, OUTPUTS, RESTING, SILENT
 from weldsim.errors import InputError
 from weldsim.frames import Transform
 from weldsim.mounts import X_FT
+from weldsim.urscript.check import is_pose, six
+from weldsim.urscript.compiler import FILE, Compiled, compile_program
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.geometry import PoseFunctions
+from weldsim.urscript.numbers import NumberFunctions
+from weldsim.urscript.values import OPERATIONS, number
 
-Value = float | tuple[str, tuple[float, ...]] | str
-DEFAULTS = {"movej": (1.05, 1.4), "movel": (0.25, 1.2), "movep": (0.25, 1.2), "servoj": (0.0, 0.0)}  # speed, acceleration
-MOVING = (
-    "movec",
-    "speedj",
-    "speedl",
-    "servoc",
-    "servol",
-    "stopj",
-    "stopl",
-    "force_mode",
-    "teach_mode",
-    "freedrive_mode",
-    "conveyor",
-)
-BLOCKS = ("while", "for", "if", "elif", "else", "thread", "switch", "loop")
-SILENT = ("def", "end", "sec", "stopj", "stopl")  # what moves is at rest already
-FURTHEST, LONGEST_TOOL = 3.0, 1.0  # [m] of a pose from the base, of a TCP from the flange
-_CALL = re.compile(r"^(\w+)\s*\((.*)\)$", re.DOTALL)
-_ASSIGN = re.compile(r"^(?:global\s+|local\s+)?(\w+)\s*=\s*([^=].*)$", re.DOTALL)
-_KEYWORD = re.compile(r"^(\w+)\s*=\s*([^=].*)$", re.DOTALL)
+TURNS = 10_000  # of all loops together; more is a program that does not end
+FURTHEST, LONGEST_TOOL, LONGEST_TURN = 3.0, 1.0, 2 * np.pi + 1e-6  # [m] of a pose from the base, of a TCP from the flange; [rad]
+LARGEST_ANGLE = 8 * np.pi  # [rad] of a joint
 
 
 def parse_script(text: str, *, source: str, X_FT: Transform | None = None) -> Program:
@@ -44,227 +35,211 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None) -> Pr
         text: the program.  source: its name, for errors.
         X_FT: flange to the frame that poses are of, in place of what the program sets.
     Raises:
-        InputError: a line that cannot be read, a target that is not finite or in millimetres, control flow, no motion.
+        InputError: a line that cannot be read, a function nobody knows, a target that is not finite or in millimetres, motions
+            that cannot be told beforehand, no motion.
     """
-    reader = _Reader(source, X_FT)
-    for number, line in _statements(text, source):
-        reader.take(number, line)
-    if not reader.motions:
-        raise InputError(f"{source}: holds no movej, movel, movep or servoj; there is nothing to check", path=source)
-    if len(reader.motions) < 2:
+    recorder = _Recorder(X_FT)
+    try:
+        recorder.run(compile_program(text.replace("\r\n", "\n").replace("\r", "\n"), recorder.builtins()))
+    except ScriptError as error:
+        where = f"line {error.line}: " if error.line else ""
+        raise InputError(f"{source}: {where}{error.reason}", path=source, line=error.line) from None
+    if not recorder.motions:
+        raise InputError(f"{source}: makes no movej, movel, movep or servoj; there is nothing to check", path=source)
+    if len(recorder.motions) < 2:
         raise InputError(f"{source}: 1 motion; a path needs two", path=source)
     return Program(
         source=source.rpartition("/")[2],
         kind="script",
-        motions=tuple(reader.motions),
-        X_FT=reader.mount,
-        pauses=reader.pauses,
-        notes=tuple(reader.notes),
+        motions=tuple(recorder.motions),
+        X_FT=recorder.state.mount,
+        pauses=recorder.pauses,
+        notes=tuple(recorder.notes),
     )
 
 
-def _statements(text: str, source: str) -> list[tuple[int, str]]:
-    """Line number and text of each statement: comments dropped, lines with open brackets joined."""
-    out, held, start = [], "", 0
-    for number, line in enumerate(text.splitlines(), 1):
-        line = re.sub(r'("[^"]*")|#.*', lambda match: match[1] or "", line).strip()
-        if not line:
-            continue
-        held, start = (f"{held} {line}", start) if held else (line, number)
-        if held.count("(") + held.count("[") <= held.count(")") + held.count("]"):
-            out.append((start, held))
-            held = ""
-    if held:
-        raise InputError(f"{source}: line {start}: a bracket is never closed", path=source, line=start)
-    return out
+class _HaltError(Exception):
+    """The program said halt."""
 
 
-class _Reader:
-    """What has been read so far. Attributes: motions; mount (X_FT of the TCP in force); pauses [s]; notes."""
+class _Unknown:
+    """What a function would say that asks a robot: nothing can be decided by it."""
 
-    def __init__(self, source: str, fixed: Transform | None) -> None:
-        self.source, self.fixed, self.mount = source, fixed, fixed or X_FT
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def _refuse(self, *_: object) -> Any:
+        raise ScriptError(f"{self._name}: what follows depends on its answer and cannot be told beforehand")
+
+    __bool__ = __eq__ = __ne__ = __lt__ = __gt__ = __le__ = __ge__ = _refuse
+
+
+class _Recorder:
+    """A program's functions. Attributes: motions, what they wrote down; state, of the robot by then; pauses [s]; notes."""
+
+    def __init__(self, fixed: Transform | None) -> None:
+        self.fixed, self.state = fixed, RobotState(fixed or X_FT)
         self.motions: list[Motion] = []
         self.notes: list[str] = []
         self.pauses = 0.0
-        self.names: dict[str, Value] = {}
-        self.arc, self.ignored, self.said_tcp = False, set(), False
+        self.lines: tuple[int, ...] = ()
+        self.turns, self.on, self.said = 0, set(), set()
 
-    def take(self, number: int, line: str) -> None:
-        """One statement."""
-        word = re.split(r"\W", line, maxsplit=1)[0]
-        if word in SILENT:
-            self.ignored |= set(re.findall(r"^def\s+(\w+)", line))
-            return
-        if word in BLOCKS:
-            raise self.wrong(number, f"{word}: which motions follow cannot be told beforehand; give a program without control flow")
-        if (call := _CALL.match(line)) is not None:
-            self._call(number, call[1], call[2])
-        elif (given := _ASSIGN.match(line)) is not None:
-            self._assign(number, given[1], given[2])
-        else:
-            raise self.wrong(number, f"{line[:60]!r} is no statement that is understood")
-
-    def wrong(self, number: int, message: str) -> InputError:
-        return InputError(f"{self.source}: line {number}: {message}", path=self.source, line=number)
-
-    def _assign(self, number: int, name: str, text: str) -> None:
+    def run(self, compiled: Compiled) -> None:
+        """The whole program, once. Raises ScriptError with the line."""
+        self.lines = compiled.lines
+        names: dict[str, Any] = {f"b_{name}": function for name, function in self.builtins().items()} | OPERATIONS
+        refuse = {"_run": "run", "_kill": "kill", "_join": "join"}
+        names |= {key: _refusing(f"{word}: what threads do cannot be told beforehand") for key, word in refuse.items()}
+        names |= {"_halt": self._halt, "_spin": self._spin, "_enter": lambda: None, "_leave": lambda: None}
         try:
-            self.names[name] = self._value(number, text)
-        except InputError:
-            # Registers, flags, strings: of no matter unless a motion asks for them.
-            self.names[name] = text
+            exec(compiled.code, names)  # built from the syntax tree alone, see the compiler
+            for _ in names["main"]():
+                pass
+        except _HaltError:
+            pass
+        except ScriptError as error:
+            raise ScriptError(error.reason, error.line or self._line(error)) from None
+        except (TypeError, ValueError, ArithmeticError, NameError, LookupError, RecursionError) as error:
+            raise ScriptError(" ".join(f"{error}".split())[:120] or type(error).__name__, self._line(error)) from None
 
-    def _call(self, number: int, name: str, inside: str) -> None:
-        handlers: dict[str, Callable[[int, str, list[str], dict[str, str]], None]] = {
-            **dict.fromkeys(("movej", "movel", "movep", "servoj"), self._motion),
-            "set_tcp": self._tcp,
-            "sleep": self._sleep,
-            "set_digital_out": self._output,
-            "set_standard_digital_out": self._output,
-            "set_tool_digital_out": self._output,
-            "set_configurable_digital_out": self._output,
+    def builtins(self) -> dict[str, Callable]:
+        """{name: function} of all that a program can call."""
+        groups = (PoseFunctions(), NumberFunctions(), self.state)
+        out: dict[str, Callable] = {
+            name: getattr(group, name)
+            for group in groups
+            for name in dir(group)
+            if not name.startswith("_") and callable(getattr(group, name))
         }
-        if name in MOVING:
-            raise self.wrong(number, f"{name}: its motion is not checked; use movej, movel, movep or servoj")
-        if name in handlers:
-            plain, keyed = [], {}
-            for part in _parts(inside):
-                match = _KEYWORD.match(part)
-                if match:
-                    keyed[match[1]] = match[2]
-                else:
-                    plain.append(part)
-            handlers[name](number, name, plain, keyed)
-        elif name not in self.ignored:
-            self.ignored.add(name)
-            self.notes.append(f"line {number}: {name} does not move the arm and is passed over")
+        out |= {name: self._asking(name) for name in ASKING}
+        out |= {name: self._passed_over(name) for name in SILENT}
+        out |= {name: _refusing(f"{name}: its motion is not checked; use movej, movel, movep or servoj") for name in MOVING}
+        out |= dict.fromkeys(RESTING, lambda *_, **__: None)
+        out |= {name: self._output(name) for name in OUTPUTS}
+        mine = (self.movej, self.movel, self.movep, self.servoj, self.set_tcp, self.sleep)
+        return out | {function.__name__: function for function in mine}
 
-    def _motion(self, number: int, name: str, plain: list[str], keyed: dict[str, str]) -> None:
-        if not plain:
-            raise self.wrong(number, f"{name} without a target")
-        target = self._value(number, plain[0])
-        if not isinstance(target, tuple) or len(target[1]) != 6:
-            raise self.wrong(number, f"{name}: the target must be p[x, y, z, rx, ry, rz] or [six joint angles]")
-        order = {"servoj": ("a", "v", "t")}.get(name, ("a", "v", "t", "r"))
-        given = {key: self._number(number, text) for key, text in (*zip(order, plain[1:], strict=False), *keyed.items())}
-        speed, acceleration = DEFAULTS[name]
-        if name == "servoj":
-            speed = acceleration = 0.0
-        else:
-            speed, acceleration = given.get("v", speed), given.get("a", acceleration)
-            if not (speed > 0 and acceleration > 0):
-                raise self.wrong(number, f"{name}: speed {speed:g} and acceleration {acceleration:g} must be positive")
-        t = given.get("t", 0.008 if name == "servoj" else 0.0)
-        if not (np.isfinite(t) and t >= 0) or (name == "servoj" and t == 0):
-            raise self.wrong(number, f"{name}: time {t:g} s must be positive")
-        q, X_BT = None, None
-        if target[0] == "p":
-            X_BT = self._torch(number, target[1])
-        else:
-            q = np.array(target[1])
-            if np.abs(q).max() > 8 * np.pi:
-                raise self.wrong(number, f"{name}: a joint at {np.abs(q).max():.4g} rad: looks like degrees")
-        self.motions.append(
-            Motion(command=name, line=number, q=q, X_BT=X_BT, speed=speed, acceleration=acceleration, t=t, arc=self.arc)  # type: ignore[arg-type]
-        )
+    def movej(self, q: Any, a: float = 1.4, v: float = 1.05, t: float = 0, r: float = 0) -> None:
+        self._move("movej", q, a, v, t, r)
 
-    def _torch(self, number: int, pose: tuple[float, ...]) -> Transform:
-        """X_BT of a pose of the TCP in force; the torch hangs on the flange whatever the TCP is."""
-        p, turn = np.array(pose[:3]), np.array(pose[3:])
-        if np.linalg.norm(p) > FURTHEST:
-            raise self.wrong(number, f"{np.linalg.norm(p):.4g} m from the base (limit {FURTHEST:g} m): looks like millimetres")
-        if np.linalg.norm(turn) > 2 * np.pi + 1e-6:
-            raise self.wrong(number, f"rotation vector of length {np.linalg.norm(turn):.4g} (limit 2 pi): looks like degrees")
-        if not self.said_tcp and self.fixed is None:
-            self.said_tcp = True
-            self.notes.append(
-                "the program sets no TCP before its first pose: poses are read as the wire's tip (--tool tool0 otherwise)"
-            )
-        X_BF = Transform.from_rotation_vector("BT", turn, p) @ self.mount.inverse()
-        return X_BF @ X_FT
+    def movel(self, pose: Any, a: float = 1.2, v: float = 0.25, t: float = 0, r: float = 0) -> None:
+        self._move("movel", pose, a, v, t, r)
 
-    def _tcp(self, number: int, _: str, plain: list[str], keyed: dict[str, str]) -> None:
-        pose = self._value(number, (plain or list(keyed.values()) or [""])[0])
-        if not isinstance(pose, tuple) or len(pose[1]) != 6:
-            raise self.wrong(number, "set_tcp: p[x, y, z, rx, ry, rz] is needed")
-        p, turn = (float(np.linalg.norm(part)) for part in (pose[1][:3], pose[1][3:]))
-        if p > LONGEST_TOOL:
-            raise self.wrong(number, f"set_tcp: {p:.4g} m from the flange (limit {LONGEST_TOOL:g} m): looks like millimetres")
-        if turn > 2 * np.pi + 1e-6:
-            raise self.wrong(number, f"set_tcp: rotation vector of length {turn:.4g} (limit 2 pi): looks like degrees")
-        self.said_tcp = True
+    def movep(self, pose: Any, a: float = 1.2, v: float = 0.25, r: float = 0) -> None:
+        self._move("movep", pose, a, v, 0, r)
+
+    def servoj(self, q: Any, a: float = 0, v: float = 0, t: float = 0.008, lookahead_time: float = 0.1, gain: float = 300) -> None:
+        if not number(t) > 0:
+            raise ScriptError(f"servoj: time {t:g} s must be positive")
+        self._record("servoj", q, 0.0, 0.0, t)
+
+    def set_tcp(self, pose: Any, tcp_name: str = "") -> None:
+        if not isinstance(pose, list) or len(pose) != 6:
+            raise ScriptError("set_tcp: p[x, y, z, rx, ry, rz] is needed")
+        x = six(pose, "set_tcp")
+        _check_pose(x, "set_tcp: ", "from the flange", LONGEST_TOOL)
+        self.said.add("tcp")
         if self.fixed is None:
-            self.mount = Transform.from_rotation_vector("FT", np.array(pose[1][3:]), np.array(pose[1][:3]))
+            self.state.mount = Transform.from_rotation_vector("FT", np.array(x[3:]), np.array(x[:3]))
 
-    def _sleep(self, number: int, _: str, plain: list[str], keyed: dict[str, str]) -> None:
-        t = self._number(number, (plain or list(keyed.values()) or ["0"])[0])
-        if t < 0:
-            raise self.wrong(number, f"sleep: {t:g} s must not be negative")
+    def sleep(self, t: float) -> None:
+        if not 0 <= number(t) < np.inf:
+            raise ScriptError(f"sleep: {t:g} s must not be negative")
         self.pauses += t
 
-    def _output(self, _number: int, _: str, plain: list[str], keyed: dict[str, str]) -> None:
-        words = [*plain, *keyed.values()]
-        self.arc = bool(words) and words[-1].strip() == "True"
+    def _move(self, name: Command, target: Any, a: Any, v: Any, t: Any, r: Any) -> None:
+        if not (0 < number(v) < np.inf and 0 < number(a) < np.inf):
+            raise ScriptError(f"{name}: speed {v:g} and acceleration {a:g} must be positive")
+        if not (0 <= number(t) < np.inf and 0 <= number(r) < np.inf):
+            raise ScriptError(f"{name}: time {t:g} s and blend radius {r:g} m must not be negative")
+        if r > 0:
+            self._note("blend", "blends are not modelled: each motion is checked as if it came to rest at its target")
+        self._record(name, target, float(v), float(a), t)
 
-    def _number(self, number: int, text: str) -> float:
-        value = self._value(number, text)
-        if not isinstance(value, float):
-            raise self.wrong(number, f"{text[:40]!r} is no number")
-        return value
-
-    def _value(self, number: int, text: str) -> Value:
-        """A finite number, a pose ("p", six numbers) or a list ("", numbers)."""
-        text = text.strip()
-        if isinstance(known := self.names.get(text), float | tuple):
-            return known
-        kind = "p" if re.match(r"^p\s*\[", text) else ""
-        try:
-            tree = ast.parse(text[1:].strip() if kind else text, mode="eval").body
-            if isinstance(tree, ast.List):
-                return kind, tuple(self._arithmetic(item) for item in tree.elts)
-            return self._arithmetic(tree)
-        except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError, MemoryError) as error:
-            reason = f": {error}" if isinstance(error, ValueError) else ""
-            raise self.wrong(number, f"{text[:60]!r} cannot be read{reason}") from None
-
-    def _arithmetic(self, node: ast.expr) -> float:
-        """The finite number that an expression of numbers, names, + - * / and d2r stands for. Raises ValueError."""
-        value: float
-        match node:
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                value = float(number)
-            case ast.Name(id="pi"):
-                value = np.pi
-            case ast.Name(id=name) if isinstance(self.names.get(name), float):
-                value = self.names[name]  # type: ignore[assignment]
-            case ast.UnaryOp(op=ast.USub(), operand=inner):
-                value = -self._arithmetic(inner)
-            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-                value = self._arithmetic(inner)
-            case ast.Call(func=ast.Name(id="d2r"), args=[inner]):
-                value = np.deg2rad(self._arithmetic(inner))
-            case ast.BinOp(left=left, op=operator, right=right):
-                a, b = self._arithmetic(left), self._arithmetic(right)
-                operations = {ast.Add: lambda: a + b, ast.Sub: lambda: a - b, ast.Mult: lambda: a * b, ast.Div: lambda: a / b}
-                if type(operator) not in operations:
-                    raise ValueError("only + - * / are understood")
-                value = operations[type(operator)]()
-            case _:
-                raise ValueError("a number is needed")
-        if not np.isfinite(value):
-            raise ValueError("not finite")
-        return float(value)
-
-
-def _parts(inside: str) -> list[str]:
-    """Arguments, split at commas outside brackets."""
-    out, depth, held = [], 0, ""
-    for mark in inside:
-        depth += (mark in "([") - (mark in ")]")
-        if mark == "," and depth == 0:
-            out.append(held.strip())
-            held = ""
+    def _record(self, name: Command, target: Any, speed: float, acceleration: float, t: float) -> None:
+        if isinstance(target, _Unknown):
+            bool(target)
+        if not isinstance(target, list) or len(target) != 6:
+            raise ScriptError(f"{name}: the target must be p[x, y, z, rx, ry, rz] or [six joint angles]")
+        values = six(target, f"{name}: target")
+        q, X_BT = None, None
+        if is_pose(target):
+            _check_pose(values, f"{name}: ", "from the base", FURTHEST)
+            if "tcp" not in self.said and self.fixed is None:
+                self._note(
+                    "no tcp", "the program sets no TCP before its first pose: poses are read as the wire's tip (--tool tool0)"
+                )
+            X_BT = self.state.to_pose(values) @ X_FT  # the torch hangs on the flange whatever the TCP is
         else:
-            held += mark
-    return [*out, held.strip()] if held.strip() else out
+            q = np.array(values)
+            if np.abs(q).max() > LARGEST_ANGLE:
+                raise ScriptError(f"{name}: a joint at {np.abs(q).max():.4g} rad: looks like degrees")
+            self.state.to_joints(values)
+        line = self._line() or 0
+        kept = {"speed": speed, "acceleration": acceleration, "t": float(t), "arc": bool(self.on)}
+        self.motions.append(Motion(command=name, line=line, q=q, X_BT=X_BT, **kept))  # type: ignore[arg-type]
+
+    def _output(self, name: str) -> Callable:
+        def switch(n: int, b: bool) -> None:
+            bool(b)
+            (self.on.add if b else self.on.discard)((name.replace("_standard", ""), n))
+
+        return switch
+
+    def _asking(self, name: str) -> Callable:
+        return lambda *_, **__: _Unknown(name)
+
+    def _passed_over(self, name: str) -> Callable:
+        def silent(*_: object, **__: object) -> str:
+            self._note(name, f"line {self._line()}: {name} does not move the arm and is passed over")
+            return ""
+
+        return silent
+
+    def _note(self, about: str, text: str) -> None:
+        if about not in self.said:
+            self.said.add(about)
+            self.notes.append(text)
+
+    def _halt(self) -> Iterator[None]:
+        raise _HaltError
+        yield
+
+    def _spin(self) -> None:
+        self.turns += 1
+        if self.turns > TURNS:
+            raise ScriptError(f"while: over {TURNS} turns; a program that does not end by itself cannot be told beforehand")
+
+    def _line(self, error: Exception | None = None) -> int | None:
+        """The line of the program that runs, or in which an error arose."""
+        found = None
+        if error is None:
+            frame = sys._getframe()
+            while frame is not None and frame.f_code.co_filename != FILE:
+                frame = frame.f_back
+            return None if frame is None else self.lines[frame.f_lineno]
+        trace = error.__traceback__
+        while trace is not None:
+            if trace.tb_frame.f_code.co_filename == FILE and trace.tb_lineno < len(self.lines):
+                found = self.lines[trace.tb_lineno]
+            trace = trace.tb_next
+        return found
+
+
+def _refusing(reason: str) -> Callable:
+    def refuse(*_: object, **__: object) -> None:
+        raise ScriptError(reason)
+
+    return refuse
+
+
+def _check_pose(values: list[float], what: str, whence: str, limit: float) -> None:
+    """Nothing, when a pose is in metres and radians. Raises ScriptError."""
+    p, turn = (float(np.linalg.norm(part)) for part in (values[:3], values[3:]))
+    if p > limit:
+        raise ScriptError(f"{what}{p:.4g} m {whence} (limit {limit:g} m): looks like millimetres")
+    if turn > LONGEST_TURN:
+        raise ScriptError(f"{what}rotation vector of length {turn:.4g} (limit 2 pi): looks like degrees")

@@ -85,6 +85,37 @@ def test_a_script_is_read_line_by_line(tmp_path):
     assert program.pauses == 0.5
 
 
+HOME = "[-1.57, -1.3, -1.9, -1.5, 1.57, 0]"
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_a_script_is_read_in_the_order_in_which_it_moves(tmp_path, newline):
+    """Functions called twice or never, targets that are computed, loops that end, lines of any system, a byte order mark."""
+    file = tmp_path / "job.script"
+    text = (
+        "def down(depth, speed=0.05):\n  movel(pose_trans(get_target_tcp_pose(), p[0, 0, depth, 0, 0, 0]), v=speed)\nend\n"
+        "def never():\n  movel(p[2, 2, 2, 0, 0, 0])\nend\n"
+        f"home = {HOME};  # (open\n"
+        'textmsg("a (bracket # here")\n'
+        "movej(home)\ndown(0.01)\n"
+        "i = 0\nwhile i < 2:\n  down(0.02, speed=i / 10 + 0.01)\n  i = i + 1\nend\nset_digital_out(3, i == 2)\n"
+        "home[5] = d2r(10)\nmovej(home)\nset_digital_out(4, False)\n"
+        "movej(get_inverse_kin(get_forward_kin(home)))\nhalt\nmovej(home)\n"
+    )
+    file.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", newline).encode())
+    program = read_program(file)
+    assert [m.command for m in program.motions] == ["movej", "movel", "movel", "movel", "movej", "movej"]
+    assert [m.line for m in program.motions] == [9, 2, 2, 2, 18, 20]
+    assert [m.speed for m in program.motions] == pytest.approx([1.05, 0.05, 0.01, 0.11, 1.05, 1.05])
+    assert [m.arc for m in program.motions] == [False, False, False, False, True, True]
+    tips = [m.X_BT.p for m in program.motions if m.X_BT is not None]
+    assert np.linalg.norm(np.diff(tips, axis=0), axis=1) == pytest.approx([0.02, 0.02], abs=1e-9)
+    first, last = program.motions[-2:]
+    assert first.q is not None
+    assert last.q is not None
+    assert last.q == pytest.approx(first.q, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
@@ -109,18 +140,25 @@ def test_a_script_is_read_line_by_line(tmp_path):
         ("p.script", "def a():\nend\n", "nothing to check"),
         ("p.script", f"movel(p[{POSE}])", "1 motion"),
         ("p.script", f"while True:\n movel(p[{POSE}])\nend", "line 1: while"),
-        ("p.script", "movel(p[0,0,0)", "bracket"),
+        ("p.script", "movel(p[0,0,0)", "line 1: expected ',' between values"),
         ("p.script", "movej([1,2,3])", "six joint angles"),
-        ("p.script", "movej([nan,0,0,0,0,0])", "cannot be read"),
+        ("p.script", "movej([nan,0,0,0,0,0])", "line 1: variable 'nan' is not defined"),
         ("p.script", "movel(p[0, -450, 100, 0, 0, 0])", "millimetres"),
         ("p.script", "movej([90, -90, 0, 0, 0, 0])", "degrees"),
         ("p.script", "movec(p[0,0,0,0,0,0], p[0,0,0,0,0,0])", "movec"),
-        ("p.script", "movej(get_target())", "cannot be read"),
+        ("p.script", "movej(get_target())", "line 1: there is no function 'get_target'"),
         ("p.script", "movej([0,0,0,0,0,0], v=-1)", "positive"),
         ("p.script", f"set_tcp(p[0, 48, 227, 0, 0, 0])\nmovel(p[{POSE}])", "line 1: set_tcp.*millimetres"),
         ("p.script", f"set_tcp(p[0, 0, 0.2, -48.7, 0, 0])\nmovel(p[{POSE}])", "line 1: set_tcp.*degrees"),
         ("p.script", f"sleep(-1)\nmovel(p[{POSE}])", "line 1: sleep"),
-        ("p.script", "drive around", "no statement"),
+        ("p.script", "drive around", "line 1: variable 'drive' is not defined"),
+        ("p.script", f"movl(p[{POSE}])\nmovel(p[{POSE}])", "line 1: there is no function 'movl'"),
+        ("p.script", f"movel(p[{POSE}], speed=0.1)", "line 1: movel.*'speed'"),
+        ("p.script", f"movel(p[{POSE}], r=-0.1)", "line 1: movel: .*blend radius"),
+        ("p.script", f"if get_digital_in(0):\n movel(p[{POSE}])\nend", "line 1: get_digital_in: .*cannot be told"),
+        ("p.script", f"thread t():\n movel(p[{POSE}])\nend\nx = run t()\nmovel(p[{POSE}])", "line 4: run: .*cannot be told"),
+        ("p.script", "a = get_actual_tcp_pose()\nmovel(a)", "line 1: get_actual_tcp_pose: .*not known"),
+        ("p.script", "movej([1e999,0,0,0,0,0])", "line 1: 1e999 is too large"),
         ("p.docx", "", "is needed"),
     ],
 )

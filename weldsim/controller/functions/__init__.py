@@ -4,11 +4,12 @@ from collections.abc import Callable
 
 from weldsim.controller.functions.geometry import GeometryFunctions
 from weldsim.controller.functions.motion import MotionFunctions
-from weldsim.controller.functions.numbers import NumberFunctions
 from weldsim.controller.functions.robot import RobotFunctions
 from weldsim.controller.functions.signals import SignalFunctions
 from weldsim.controller.functions.system import SystemFunctions
 from weldsim.controller.machine import Machine
+from weldsim.urscript.geometry import PoseFunctions
+from weldsim.urscript.numbers import NumberFunctions
 
 E_ONLY = frozenset(
     [
@@ -36,6 +37,7 @@ def builtins(machine: Machine) -> dict[str, Callable]:
         RobotFunctions(machine),
         SignalFunctions(machine),
         SystemFunctions(machine),
+        PoseFunctions(),
         NumberFunctions(),
     )
     found = {name: getattr(group, name) for group in groups for name in dir(group) if not name.startswith("_")}

@@ -5,15 +5,15 @@ from math import hypot
 from typing import Any
 
 from weldsim.controller.errors import MotionFault
-from weldsim.controller.functions.check import is_pose, positive, six
 from weldsim.controller.kinematics import pose_joints, tcp_pose
 from weldsim.controller.machine import Machine
-from weldsim.controller.poses import Matrix, pose_between, turn_between
 from weldsim.controller.reference import STOP_DECELERATION
 from weldsim.controller.trapezoid import Trapezoid
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.values import number
 from weldsim.kinematics import JOINT_LIMIT, SPEED_LIMIT
+from weldsim.urscript.check import is_pose, positive, six
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.poses import Matrix, pose_between, turn_between
+from weldsim.urscript.values import number
 
 Motion = Generator[None, None, None]
 Step = Callable[[], object]

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from weldsim.controller.functions.check import six
 from weldsim.controller.kinematics import tcp_pose
 from weldsim.controller.machine import Machine
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.values import Pose, number
+from weldsim.urscript.check import six
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.values import Pose, number
 
 MAX_PAYLOAD = 10.0  # [kg] what a UR5 accepts is less, its newer firmware more; beyond this it is a mistake of units
 

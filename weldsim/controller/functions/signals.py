@@ -4,8 +4,8 @@ from typing import Any
 
 from weldsim.controller.machine import Machine
 from weldsim.controller.registers import BITS, DOUBLES, INTEGERS
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.values import number, type_name
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.values import number, type_name
 
 
 class SignalFunctions:

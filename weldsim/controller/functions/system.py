@@ -5,8 +5,8 @@ from typing import Any
 
 from weldsim.controller.inputs import input_type
 from weldsim.controller.machine import Machine
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.values import number
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.values import number
 
 
 class SystemFunctions:

@@ -4,8 +4,8 @@ import math
 import random as chance
 from typing import Any
 
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.values import number
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.values import number
 
 
 class NumberFunctions:

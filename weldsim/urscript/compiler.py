@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from inspect import isgeneratorfunction, signature, unwrap
 from types import CodeType
 
-from weldsim.controller.urscript import tree
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.parser import parse
-from weldsim.controller.urscript.scopes import Scopes, find_scopes, walk
+from weldsim.urscript import tree
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.parser import parse
+from weldsim.urscript.scopes import Scopes, find_scopes, walk
 
 _OPERATORS = {"xor": "!=", "==": "==", "!=": "!=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "and": "and", "or": "or"}
 _CHECKED = {"+": "_add", "-": "_subtract", "*": "_multiply", "/": "_divide", "%": "_modulo"}

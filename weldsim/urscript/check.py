@@ -3,8 +3,8 @@
 from math import isfinite
 from typing import Any
 
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.values import Pose, number, type_name
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.values import Pose, number, type_name
 
 
 def six(value: Any, name: str) -> list[float]:

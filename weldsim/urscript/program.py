@@ -4,9 +4,9 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 from types import TracebackType
 from typing import Any
 
-from weldsim.controller.urscript.compiler import FILE, Compiled
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.values import OPERATIONS
+from weldsim.urscript.compiler import FILE, Compiled
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.values import OPERATIONS
 
 MAX_TURNS = 20_000  # loop turns of one thread in one control period; more is a loop that never waits
 MAX_THREADS = 50

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from weldsim.controller.urscript.compiler import compile_program
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.program import Program
+from weldsim.urscript.compiler import compile_program
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.program import Program
 
 
 def run(text: str, periods: int = 50) -> list[tuple]:

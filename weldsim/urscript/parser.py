@@ -1,8 +1,8 @@
 """Syntax trees from URScript text, by recursive descent."""
 
-from weldsim.controller.urscript import tree
-from weldsim.controller.urscript.errors import ScriptError
-from weldsim.controller.urscript.lexer import Token, tokens
+from weldsim.urscript import tree
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.lexer import Token, tokens
 
 _BINARY = (("or",), ("xor",), ("and",), ("==", "!=", "<", ">", "<=", ">="), ("+", "-"), ("*", "/", "%"))
 """Operators from loosest to tightest; `not` binds between `and` and comparisons."""
@@ -237,4 +237,7 @@ def _number(token: Token) -> float | int:
     text = token.text.lower()
     if text.startswith("0x"):
         return int(text, 16)
-    return float(text) if "." in text or "e" in text else int(text)
+    value = float(text) if "." in text or "e" in text else int(text)
+    if value == float("inf"):
+        raise ScriptError(f"{token.text} is too large a number", token.line)
+    return value

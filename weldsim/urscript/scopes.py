@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import cache
 
-from weldsim.controller.urscript import tree
+from weldsim.urscript import tree
 
 
 def walk(node: object, into_functions: bool = True) -> Iterator[tree.Node]:
@@ -15,8 +16,14 @@ def walk(node: object, into_functions: bool = True) -> Iterator[tree.Node]:
         yield node
         if isinstance(node, tree.Function) and not into_functions:
             return
-        for field in fields(node):
-            yield from walk(getattr(node, field.name), into_functions)
+        for name in _parts(type(node)):
+            yield from walk(getattr(node, name), into_functions)
+
+
+@cache
+def _parts(kind: type[tree.Node]) -> tuple[str, ...]:
+    """Names of a node's fields."""
+    return tuple(field.name for field in fields(kind))
 
 
 @dataclass(frozen=True)
@@ -44,11 +51,12 @@ class Scopes:
 
 def find_scopes(body: tuple[tree.Statement, ...], slow_builtins: frozenset[str]) -> Scopes:
     """Scopes of a program with this body."""
-    functions = {node.name: node for node in walk(body) if isinstance(node, tree.Function)}
-    shared = {node.name for node in walk(body) if isinstance(node, tree.Assign) and node.scope == "global"}
+    nodes = tuple(walk(body))
+    functions = {node.name: node for node in nodes if isinstance(node, tree.Function)}
+    shared = {node.name for node in nodes if isinstance(node, tree.Assign) and node.scope == "global"}
     shared |= {node.name for node in walk(body, into_functions=False) if isinstance(node, tree.Assign)}
     slow = {name for name, function in functions.items() if function.kind == "thread"}
-    slow |= {node.call.function for node in walk(body) if isinstance(node, tree.Run)} & set(functions)
+    slow |= {node.call.function for node in nodes if isinstance(node, tree.Run)} & set(functions)
     grew = True
     while grew:
         grew = False

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from weldsim.controller.urscript.errors import ScriptError
+from weldsim.urscript.errors import ScriptError
 
 
 class Pose(list):

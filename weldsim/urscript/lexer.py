@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from weldsim.controller.urscript.errors import ScriptError
+from weldsim.urscript.errors import ScriptError
 
 Kind = Literal["name", "keyword", "number", "string", "symbol", "end of text"]
 

@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from weldsim.controller.kinematics import jacobian, pose_joints, tcp_pose
-from weldsim.controller.poses import inverse_matrix, matrix_of, pose_between, pose_of, turn_between
 from weldsim.frames import Transform
 from weldsim.kinematics import torch_pose
 from weldsim.mounts import X_FT
+from weldsim.urscript.poses import inverse_matrix, matrix_of, pose_between, pose_of, turn_between
 
 TURNS = [0.0, 1e-9, 1e-5, 1e-3, 1.0, 3.0, np.pi - 1e-3, np.pi - 1e-7, np.pi]
 

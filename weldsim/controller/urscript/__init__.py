@@ -1,1 +1,0 @@
-"""URScript: text to syntax tree to Python generators, one generator a thread of the robot program."""

@@ -1,0 +1,99 @@
+"""What a robot program knows of its robot while it is only read: the TCP, and where the arm is after the motions so far."""
+
+from typing import Any
+
+import numpy as np
+
+from weldsim.errors import UnreachableError
+from weldsim.frames import Transform
+from weldsim.kinematics import flange_pose, inverse_near
+from weldsim.urscript.check import six
+from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.values import Pose
+
+
+class RobotState:
+    """Functions of a program that ask where the arm is. Where it stands before its first motion is not known.
+
+    Attributes:
+        mount: X_FT of the TCP in force.
+    """
+
+    def __init__(self, mount: Transform) -> None:
+        self.mount = mount
+        self._q: np.ndarray | None = None  # [rad] the last joint angles that are known
+        self._since: list[Transform] = []  # X_BF of the motions after them
+
+    def to_joints(self, q: list[float]) -> None:
+        """The arm goes to joint angles [rad]."""
+        self._q, self._since = np.array(q), []
+
+    def to_pose(self, pose: list[float]) -> Transform:
+        """The arm goes to a pose of the TCP; its flange's, X_BF."""
+        X_BF = self._flange(pose)
+        self._since.append(X_BF)
+        return X_BF
+
+    def get_actual_joint_positions(self) -> list[float]:
+        return self._joints("get_actual_joint_positions").tolist()
+
+    def get_target_joint_positions(self) -> list[float]:
+        return self._joints("get_target_joint_positions").tolist()
+
+    def get_actual_tcp_pose(self) -> Pose:
+        return self._tcp_pose("get_actual_tcp_pose")
+
+    def get_target_tcp_pose(self) -> Pose:
+        return self._tcp_pose("get_target_tcp_pose")
+
+    def get_tcp_offset(self) -> Pose:
+        return _pose(self.mount)
+
+    def get_forward_kin(self, q: Any = None, tcp: Any = None) -> Pose:
+        """The pose of the TCP, or of another one, at joint angles, by default where the arm is."""
+        joints = self._joints("get_forward_kin") if q is None else np.array(six(q, "get_forward_kin"))
+        return _pose(flange_pose(joints) @ self._mount(tcp))
+
+    def get_inverse_kin(
+        self, x: Any, qnear: Any = None, maxPositionError: float = 1e-10, maxOrientationError: float = 1e-10, tcp: Any = None
+    ) -> list[float]:
+        """Joint angles that put the TCP at x, those nearest to qnear, by default to where the arm is."""
+        near = self._joints("get_inverse_kin") if qnear is None else np.array(six(qnear, "get_inverse_kin"))
+        x = six(x, "get_inverse_kin")
+        return self._near(self._pose_of(x) @ self._mount(tcp).inverse(), near, "get_inverse_kin").tolist()
+
+    def _mount(self, tcp: Any) -> Transform:
+        if tcp is None or isinstance(tcp, str):
+            return self.mount
+        values = six(tcp, "tcp")
+        return Transform.from_rotation_vector("FT", np.array(values[3:]), np.array(values[:3]))
+
+    def _pose_of(self, pose: list[float]) -> Transform:
+        return Transform.from_rotation_vector("BT", np.array(pose[3:]), np.array(pose[:3]))
+
+    def _flange(self, pose: list[float]) -> Transform:
+        return self._pose_of(pose) @ self.mount.inverse()
+
+    def _tcp_pose(self, name: str) -> Pose:
+        X_BF = self._since[-1] if self._since else flange_pose(self._joints(name))
+        return _pose(X_BF @ self.mount)
+
+    def _joints(self, name: str) -> np.ndarray:
+        """Where the arm is [rad], its poses since reached in the branch it is in."""
+        if self._q is None:
+            raise ScriptError(f"{name}: where the arm is by then is not known; begin with movej to six joint angles")
+        q = self._q
+        for X_BF in self._since:
+            q = self._near(X_BF, q, name)
+        self._q, self._since = q, []
+        return q
+
+    def _near(self, X_BF: Transform, near: np.ndarray, name: str) -> np.ndarray:
+        try:
+            return inverse_near(X_BF, near)
+        except UnreachableError as error:
+            raise ScriptError(f"{name}: {error}") from None
+
+
+def _pose(X: Transform) -> Pose:
+    return Pose([*X.p.tolist(), *X.rotation_vector.tolist()])
