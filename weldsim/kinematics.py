@@ -49,6 +49,27 @@ def link_frames(q: Float[ndarray, "*batch 6"]) -> Float[ndarray, "*batch 6 4 4"]
     return out
 
 
+def dh_frames(dh: Float[ndarray, "6 4"], q: Float[ndarray, "*batch 6"]) -> Float[ndarray, "*batch 7 4 4"]:
+    """Pose in B of B itself and of the six frames of any arm by standard DH; joint k turns about z of frame k, the last is F.
+
+    Args:
+        dh: theta offset [rad], a [m], d [m], alpha [rad] of each joint, as `DH` has them.  q: joint angles [rad].
+    """
+    theta = np.asarray(q, float) + dh[:, 0]
+    (_, a, d, alpha), c, s = dh.T, np.cos(theta), np.sin(theta)
+    ca, sa = np.cos(alpha), np.sin(alpha)
+    T = np.zeros((*theta.shape, 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 2], T[..., 0, 3] = c, -s * ca, s * sa, a * c
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2], T[..., 1, 3] = s, c * ca, -c * sa, a * s
+    T[..., 2, 1], T[..., 2, 2], T[..., 2, 3] = sa, ca, d
+    T[..., 3, 3] = 1.0
+    out = np.empty((*theta.shape[:-1], 7, 4, 4))
+    out[..., 0, :, :] = np.eye(4)
+    for k in range(6):
+        out[..., k + 1, :, :] = out[..., k, :, :] @ T[..., k, :, :]
+    return out
+
+
 def flange_pose(q: Float[ndarray, "*batch 6"]) -> Transform:
     """X_BF for joint angles q [rad]; any batch shape."""
     return Transform.from_matrix("BF", link_frames(q)[..., 5, :, :])

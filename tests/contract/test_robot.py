@@ -73,8 +73,8 @@ def test_facts_are_those_of_our_arm_and_mount(robot: Robot) -> None:
         assert facts.X_FT is not None
         assert np.abs(facts.X_FT.matrix - X_FT.matrix).max() < 1e-6
         assert facts.payload_kg == pytest.approx(PAYLOAD)
-        if facts.dh is not None:
-            assert np.abs(facts.dh - DH).max() < 5e-3
+        assert facts.dh is not None
+        assert np.abs(facts.dh - DH).max() < 1e-12
 
 
 def test_state_is_consistent_and_moves_with_time(robot: Robot) -> None:

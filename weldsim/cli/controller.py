@@ -3,6 +3,7 @@
 import signal
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
@@ -35,6 +36,10 @@ class Controller(ConfigOptions):
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE")] = ""
     """What stands on the table, a name or a TOML file; nothing by default. A collision is a protective stop."""
 
+    calibration: Path | None = None
+    """Factory calibration of the arm, a controller's calibration.conf: what the arm tells of itself on port 30001, and how poses
+    and joint angles belong together. A nominal UR5 by default."""
+
     speed: float = 1.0
     """Simulated seconds in a second."""
 
@@ -60,10 +65,16 @@ class Controller(ConfigOptions):
         return self._serve() if self.action == "serve" else self._ask()
 
     def _serve(self) -> int:
+        from weldsim.controller.calibration import Calibration, read_calibration
         from weldsim.controller.config import ControllerConfig
         from weldsim.controller.start import new_server
 
-        config = ControllerConfig(speed=self.speed, low_when_stopped=self.low_when_stopped, unlock_delay=self.unlock_delay)
+        config = ControllerConfig(
+            speed=self.speed,
+            low_when_stopped=self.low_when_stopped,
+            unlock_delay=self.unlock_delay,
+            calibration=read_calibration(self.calibration) if self.calibration else Calibration(),
+        )
         server = new_server(self.profile, self.scene_of(self.scene) if self.scene else None, config, self.host)
         if self.verbose:
             machine = server.machine

@@ -1,7 +1,8 @@
 """How a virtual controller behaves beyond what its profile says."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from weldsim.controller.calibration import Calibration
 from weldsim.errors import ConfigError
 from weldsim.quantity import Second, require_within
 
@@ -18,6 +19,9 @@ class ControllerConfig:
     """Digital outputs that the installation drops when no program runs any longer; the arc belongs among them."""
     standstill: float = 1e-3
     """Joint speed below which the arm counts as steady [rad/s]."""
+    calibration: Calibration = field(default_factory=Calibration)
+    """Factory calibration of the arm: what it tells of itself, and what its poses and joint angles mean to it. Collisions are
+    judged with the nominal arm's bodies."""
 
     def __post_init__(self) -> None:
         require_within(self, {"speed": (0.01, 100.0), "unlock_delay": (0.0, 60.0), "standstill": (1e-6, 1.0)}, "controller")

@@ -24,6 +24,15 @@ class Session(Protocol):
         ...
 
 
+@runtime_checkable
+class Stream(Protocol):
+    """A session whose client is told something without asking."""
+
+    def data(self) -> bytes:
+        """What is due after one more control period, or nothing."""
+        ...
+
+
 class Connection:
     """A non-blocking socket with what could not be sent yet.
 

@@ -1,6 +1,6 @@
 """What the controller knows of its arm: forward and inverse kinematics of the flange and of the active tool centre point.
 
-Joint angles and poses are plain lists, as programs and RTDE have them; the figures are those of `weldsim.kinematics`.
+Joint angles and poses are plain lists, as programs and RTDE have them.
 """
 
 from collections.abc import Sequence
@@ -10,44 +10,70 @@ import ur_analytic_ik
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.kinematics import JOINT_LIMIT, link_frames
+from weldsim.kinematics import DH, JOINT_LIMIT, dh_frames
 from weldsim.urscript.poses import Matrix, inverse_matrix, matrix_of, pose_of
 
 _IK = ur_analytic_ik.ur5.inverse_kinematics  # pyright: ignore[reportAttributeAccessIssue] - compiled, untyped
+ROUNDS = 10  # of refining a solution; each squares its error, and the first is some millimetres
+EXACT = 1e-10  # [m], [rad]
 
 
-def tcp_matrix(q: Sequence[float], tcp: Matrix) -> Matrix:
-    """X_BT for joint angles q [rad] and X_FT = tcp."""
-    return link_frames(np.asarray(q, float))[5] @ tcp
+class Kinematics:
+    """Of one arm.
 
+    Attributes:
+        dh: (6, 4) theta offset [rad], a [m], d [m], alpha [rad] of each joint, factory calibration included.
+    """
 
-def tcp_pose(q: Sequence[float], tcp: Matrix) -> list[float]:
-    """Pose of the TCP in the base for joint angles q [rad]."""
-    return pose_of(tcp_matrix(q, tcp))
+    def __init__(self, dh: Float[ndarray, "6 4"] = DH) -> None:
+        self.dh = dh
+        self._nominal = bool((dh == DH).all())
 
+    def tcp_matrix(self, q: Sequence[float], tcp: Matrix) -> Matrix:
+        """X_BT for joint angles q [rad] and X_FT = tcp."""
+        return dh_frames(self.dh, np.asarray(q, float))[6] @ tcp
 
-def joints_near(matrix: Matrix, tcp: Matrix, near: Sequence[float]) -> list[float] | None:
-    """Joint angles [rad] that put the TCP at X_BT = matrix, the solution nearest to `near` within limits; None without any."""
-    solutions = _IK(matrix @ inverse_matrix(tcp))
-    if len(solutions) == 0:
+    def tcp_pose(self, q: Sequence[float], tcp: Matrix) -> list[float]:
+        """Pose of the TCP in the base for joint angles q [rad]."""
+        return pose_of(self.tcp_matrix(q, tcp))
+
+    def joints_near(self, matrix: Matrix, tcp: Matrix, near: Sequence[float]) -> list[float] | None:
+        """Joint angles [rad] that put the TCP at X_BT = matrix, the solution nearest to `near` within limits; None without any."""
+        flange = matrix @ inverse_matrix(tcp)
+        solutions = _IK(flange)
+        if len(solutions) == 0:
+            return None
+        q = np.array([np.asarray(solution, float).reshape(6) for solution in solutions])
+        if not np.isfinite(q).all():
+            return None
+        start = np.asarray(near, float)
+        turned = q + 2 * np.pi * np.round((start - q) / (2 * np.pi))
+        turned = np.where(np.abs(turned) > JOINT_LIMIT, q, turned)
+        nearest = turned[np.abs(turned - start).max(axis=1).argmin()].tolist()
+        return nearest if self._nominal else self._refined(nearest, flange)
+
+    def pose_joints(self, pose: Sequence[float], tcp: Matrix, near: Sequence[float]) -> list[float] | None:
+        """`joints_near` for a pose."""
+        return self.joints_near(matrix_of(pose), tcp, near)
+
+    def jacobian(self, q: Sequence[float], tcp: Matrix) -> Float[ndarray, "6 6"]:
+        """Geometric Jacobian of the TCP in the base: rows vx vy vz [m] and wx wy wz [rad], one column a joint."""
+        frames = dh_frames(self.dh, np.asarray(q, float))
+        tip = (frames[6] @ tcp)[:3, 3]
+        axes = frames[:6, :3, 2]
+        return np.concatenate([np.cross(axes, tip - frames[:6, :3, 3]).T, axes.T])
+
+    def _refined(self, q: Sequence[float], flange: Matrix) -> list[float] | None:
+        """The nominal arm's solution made the calibrated arm's by Newton's method; None where that does not converge."""
+        still, found = np.eye(4), np.asarray(q, float)
+        for _ in range(ROUNDS):
+            here = self.tcp_matrix(found.tolist(), still)
+            turn = pose_of(flange @ inverse_matrix(here))[3:]
+            off = np.concatenate([flange[:3, 3] - here[:3, 3], turn])
+            if np.abs(off).max() <= EXACT:
+                return found.tolist()
+            try:
+                found = found + np.linalg.solve(self.jacobian(found.tolist(), still), off)
+            except np.linalg.LinAlgError:
+                return None
         return None
-    q = np.array([np.asarray(solution, float).reshape(6) for solution in solutions])
-    if not np.isfinite(q).all():
-        return None
-    start = np.asarray(near, float)
-    turned = q + 2 * np.pi * np.round((start - q) / (2 * np.pi))
-    turned = np.where(np.abs(turned) > JOINT_LIMIT, q, turned)
-    return turned[np.abs(turned - start).max(axis=1).argmin()].tolist()
-
-
-def pose_joints(pose: Sequence[float], tcp: Matrix, near: Sequence[float]) -> list[float] | None:
-    """`joints_near` for a pose."""
-    return joints_near(matrix_of(pose), tcp, near)
-
-
-def jacobian(q: Sequence[float], tcp: Matrix) -> Float[ndarray, "6 6"]:
-    """Geometric Jacobian of the TCP in the base: rows vx vy vz [m] and wx wy wz [rad], one column a joint."""
-    frames = link_frames(np.asarray(q, float))
-    tip = (frames[5] @ tcp)[:3, 3]
-    axes = frames[:, :3, 2]  # every joint turns about its frame's z (modified DH)
-    return np.concatenate([np.cross(axes, tip - frames[:, :3, 3]).T, axes.T])

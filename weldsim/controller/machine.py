@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from weldsim.controller.arm import Arm
 from weldsim.controller.config import ControllerConfig
+from weldsim.controller.kinematics import Kinematics
 from weldsim.controller.profile import Profile
 from weldsim.controller.reference import Reference
 from weldsim.controller.registers import Registers
@@ -28,7 +29,8 @@ class Machine:
     """A UR controller without its network.
 
     Attributes:
-        profile, config: what it is.  arm: what it moves.  io: registers and signals.  reference: what the arm follows.
+        profile, config: what it is.  arm: what it moves.  kinematics: what it knows of its geometry.
+        io: registers and signals.  reference: what the arm follows.
         tool: active TCP and payload.  watchdogs: over input registers.
         t: time since power-on [s].
         robot_mode, safety_mode, runtime: states.
@@ -41,7 +43,8 @@ class Machine:
     def __init__(self, profile: Profile, arm: Arm, config: ControllerConfig | None = None) -> None:
         self.profile, self.arm, self.config = profile, arm, config or ControllerConfig()
         self.io, self.tool, self.watchdogs = Registers(), Tool(), Watchdogs()
-        self.reference = Reference(arm.q, profile.period)
+        self.kinematics = Kinematics(self.config.calibration.dh)
+        self.reference = Reference(arm.q, profile.period, self.kinematics)
         self.t, self.busy = 0.0, 0.0
         self.robot_mode, self.safety_mode, self.runtime = RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.STOPPED
         self.remote, self.popup, self.loaded = True, "", ""

@@ -9,7 +9,7 @@ from math import exp
 import numpy as np
 
 from weldsim.controller.errors import MotionFault
-from weldsim.controller.kinematics import jacobian
+from weldsim.controller.kinematics import Kinematics
 from weldsim.kinematics import JOINT_LIMIT, SPEED_LIMIT
 from weldsim.urscript.poses import Matrix
 
@@ -26,8 +26,8 @@ class Reference:
         commanded: whether this period's motion has been commanded.
     """
 
-    def __init__(self, q: Sequence[float], period: float) -> None:
-        self.period = period
+    def __init__(self, q: Sequence[float], period: float, kinematics: Kinematics) -> None:
+        self.period, self._kinematics = period, kinematics
         self.place(q)
 
     def place(self, q: Sequence[float]) -> None:
@@ -98,7 +98,7 @@ class Reference:
 
     def twist(self, tcp: Matrix) -> list[float]:
         """Velocity of the TCP [m/s, rad/s] in the base."""
-        return (jacobian(self.q, tcp) @ np.array(self.qd)).tolist()
+        return (self._kinematics.jacobian(self.q, tcp) @ np.array(self.qd)).tolist()
 
     def drive(self, twist: Sequence[float], tcp: Matrix) -> None:
         """This period ends with the TCP at this velocity.
@@ -106,7 +106,7 @@ class Reference:
         Raises:
             MotionFault: the arm is singular there, or a joint would be too fast.
         """
-        J = jacobian(self.q, tcp)
+        J = self._kinematics.jacobian(self.q, tcp)
         try:
             qd = np.linalg.solve(J, np.array(twist)).tolist()
         except np.linalg.LinAlgError:

@@ -30,7 +30,7 @@ def split_programs(text: str) -> tuple[list[str], str]:
 
 
 class ScriptSession:
-    """One client that sends scripts. It is never told anything: the state streams of these ports are not modelled."""
+    """One client that sends scripts. It is told nothing here: of the state streams only 30001 has what `primary` says."""
 
     def __init__(self, machine: Machine) -> None:
         self._machine, self._text = machine, ""

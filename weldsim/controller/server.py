@@ -10,11 +10,12 @@ import socket
 import time
 from collections.abc import Callable
 
-from weldsim.controller.connection import Connection, Session
+from weldsim.controller.connection import Connection, Session, Stream
 from weldsim.controller.dashboard import Dashboard, DashboardSession
 from weldsim.controller.faults import FaultSession
 from weldsim.controller.functions import builtins
 from weldsim.controller.machine import Machine
+from weldsim.controller.primary import PrimarySession
 from weldsim.controller.rtde import Claims, RtdeSession
 from weldsim.controller.script_port import ScriptSession
 from weldsim.errors import InputError
@@ -38,7 +39,7 @@ class Server:
         dashboard, claims = Dashboard(machine), Claims()
         sessions: dict[int, Callable[[], Session]] = {
             DASHBOARD: lambda: DashboardSession(dashboard),
-            PRIMARY: lambda: ScriptSession(machine),
+            PRIMARY: lambda: PrimarySession(machine),
             SECONDARY: lambda: ScriptSession(machine),
             REALTIME: lambda: ScriptSession(machine),
             RTDE: lambda: RtdeSession(machine, claims),
@@ -105,7 +106,7 @@ class Server:
         if not self._stalled:
             for connection in self._connections:
                 # A client that does not keep up loses packets, never parts of one.
-                if isinstance(connection.session, RtdeSession) and not connection.behind:
+                if isinstance(connection.session, Stream) and not connection.behind:
                     connection.send(connection.session.data())
         self._forget_closed()
         self.machine.busy = time.perf_counter() - began

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from weldsim.controller.kinematics import jacobian, tcp_pose
 from weldsim.execution.ur_modes import RobotMode, RuntimeState, safety_bits
 from weldsim.kinematics import link_frames
 
@@ -31,7 +30,7 @@ class Snapshot:
         self.t, self.busy, self.io = machine.t, machine.busy, machine.io
         self.q, self.qd, self.torque = arm.q, arm.qd, arm.torque
         self.q_target, self.qd_target, self.qdd_target = reference.q, reference.qd, reference.qdd
-        self._tcp = tool.tcp_matrix
+        self._tcp, self._kinematics = tool.tcp_matrix, machine.kinematics
         self.tcp_offset, self.payload = tool.tcp, tool.payload
         self.payload_cog, self.payload_inertia = tool.cog, tool.inertia
         self.robot_mode, self.safety_mode = int(machine.robot_mode), int(machine.safety_mode)
@@ -47,19 +46,20 @@ class Snapshot:
 
     @cached_property
     def tcp_pose(self) -> list[float]:
-        return tcp_pose(self.q, self._tcp)
+        return self._kinematics.tcp_pose(self.q, self._tcp)
 
     @cached_property
     def tcp_pose_target(self) -> list[float]:
-        return tcp_pose(self.q_target, self._tcp)
+        return self._kinematics.tcp_pose(self.q_target, self._tcp)
 
     @cached_property
     def tcp_speed(self) -> list[float]:
-        return (jacobian(self.q, self._tcp) @ self.qd).tolist() if any(self.qd) else [0.0] * 6
+        return (self._kinematics.jacobian(self.q, self._tcp) @ self.qd).tolist() if any(self.qd) else [0.0] * 6
 
     @cached_property
     def tcp_speed_target(self) -> list[float]:
-        return (jacobian(self.q_target, self._tcp) @ self.qd_target).tolist() if any(self.qd_target) else [0.0] * 6
+        J = self._kinematics.jacobian(self.q_target, self._tcp)
+        return (J @ self.qd_target).tolist() if any(self.qd_target) else [0.0] * 6
 
     @cached_property
     def elbow(self) -> list[float]:

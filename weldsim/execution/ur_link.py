@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from weldsim.errors import ExecutionError
+from weldsim.execution.ur_arm import ArmTold, tell_arm
 from weldsim.execution.ur_client import ClientSettings
 from weldsim.execution.ur_config import PERIODS, Series, UrConfig
 from weldsim.execution.ur_dashboard import Dashboard, Identity
@@ -25,13 +26,14 @@ class Link:
     """What a connection consists of.
 
     Attributes:
-        series, period [s]: of the controller.  identity: what the dashboard says.
+        series, period [s]: of the controller.  identity: what the dashboard says.  arm: its own figures.
         stream: of states.  client: the process that commands.  first: the state when all was ready.
     """
 
     series: Series
     period: float
     identity: Identity
+    arm: ArmTold
     stream: StateStream
     client: ClientProcess
     first: Sample
@@ -55,6 +57,7 @@ def open_link(config: UrConfig, name: str) -> Link:
     client: ClientProcess | None = None
     try:
         identity = _greet(config)
+        arm = tell_arm(config.host)
         stream = StateStream(config.host, config.connect_timeout)
         series = _series(config, stream)
         sample = _await(stream, lambda sample: True, config.connect_timeout)
@@ -68,7 +71,7 @@ def open_link(config: UrConfig, name: str) -> Link:
         for trouble in (_tcp_trouble(config, client.tcp), _payload_trouble(config, first)):
             if trouble is not None:
                 raise refuse(trouble)
-        return Link(series=series, period=PERIODS[series], identity=identity, stream=stream, client=client, first=first)
+        return Link(series=series, period=PERIODS[series], identity=identity, arm=arm, stream=stream, client=client, first=first)
     except (LinkError, ClientError) as error:
         _abandon(stream, client)
         raise refuse(Trouble("connection", f"not connected: {error}")) from None

@@ -111,7 +111,7 @@ class UrRobot(Robot):
             raise ExecutionError(f"{self.name}: no facts: {lost}; connect again", rule="link", t=self._t) from None
         self._read_all(link)
         ours = self._trouble is None and link.client.alive
-        return robot_facts(self._last, identity, link.series, ours=ours, tcp=link.client.tcp)
+        return robot_facts(self._last, identity, link.series, link.arm, ours=ours, tcp=link.client.tcp)
 
     def state(self) -> RobotState:
         """The state that ended the last `servo`; the newest where nothing is being streamed, or the caller is late."""

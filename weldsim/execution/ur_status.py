@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from weldsim.errors import ExecutionError
+from weldsim.execution.ur_arm import ArmTold
 from weldsim.execution.ur_dashboard import Identity
 from weldsim.execution.ur_modes import RobotMode, RuntimeState, SafetyMode
 from weldsim.execution.ur_stream import Sample
@@ -116,11 +117,12 @@ def robot_state(sample: Sample, origin: float, mode: str) -> RobotState:
     )
 
 
-def robot_facts(sample: Sample, identity: Identity, series: str, *, ours: bool, tcp: Sequence[float]) -> RobotFacts:
+def robot_facts(sample: Sample, identity: Identity, series: str, arm: ArmTold, *, ours: bool, tcp: Sequence[float]) -> RobotFacts:
     """What the controller says of itself.
 
     Args:
         sample: its newest state.  identity: its dashboard's words.  series: "cb3" or "e".
+        arm: its figures, or why they are not told.
         ours: whether the program that runs is ours.  tcp: X_FT as a pose, as read back at connection, for older controllers.
     """
     pose = np.array(sample.tcp_offset or tcp, float)
@@ -129,6 +131,8 @@ def robot_facts(sample: Sample, identity: Identity, series: str, *, ours: bool, 
         series=series,
         version=identity.software,
         serial=identity.serial,
+        dh=arm.dh,
+        dh_note=arm.note,
         X_FT=Transform.from_rotation_vector("FT", pose[3:], pose[:3]),
         payload_kg=sample.payload,
         payload_cog=None if sample.payload_cog is None else np.array(sample.payload_cog),

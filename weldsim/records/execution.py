@@ -38,6 +38,7 @@ class RobotFacts:
         version: of its software, "3.15.8" say.  serial: of the arm.
         dh: (6, 4) DH parameters (theta offset [rad], a [m], d [m], alpha [rad]) a joint, factory calibration included, in UR's
             own convention (standard DH: a and alpha lie behind the joint's d).
+        dh_note: how good they are in the controller's word, "calibrated" say; where dh is None, why, in one word.
         X_FT: flange to torch tip.  payload_kg: mass on the flange [kg].  payload_cog: (3,) its centre in F [m].
         remote_control: whether it may be commanded from outside; None where there is no such switch.
         safety: state of the safety system, "normal" where nothing is wrong.  mode: of the arm, "running" when it can move.
@@ -49,6 +50,7 @@ class RobotFacts:
     version: str
     serial: str
     dh: Float[ndarray, "6 4"] | None = None
+    dh_note: str = ""
     X_FT: Transform | None = None
     payload_kg: float | None = None
     payload_cog: Float[ndarray, "3"] | None = None

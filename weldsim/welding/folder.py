@@ -83,12 +83,15 @@ def job_json(job: JobConfig) -> dict[str, Any]:
 
 
 def contract_json(clauses: tuple[Clause, ...], facts: RobotFacts | None) -> dict[str, Any]:
-    """The contract as JSON values: its lines, and the plain facts."""
-    plain = ("model", "series", "version", "serial", "payload_kg", "remote_control", "safety", "mode", "program_running")
+    """The contract as JSON values: its lines, and the plain facts; dh as `RobotFacts` has it."""
+    plain = ("model", "series", "version", "serial", "dh_note", "payload_kg", "remote_control", "safety", "mode", "program_running")
+    told = None
+    if facts is not None:
+        told = {name: getattr(facts, name) for name in plain} | {"dh": None if facts.dh is None else facts.dh.tolist()}
     return {
         "schema": "weldsim.contract/1",
         "kept": all(clause.passed is not False for clause in clauses) and bool(clauses),
-        "facts": None if facts is None else {name: getattr(facts, name) for name in plain},
+        "facts": told,
         "clauses": [asdict(clause) for clause in clauses],
     }
 

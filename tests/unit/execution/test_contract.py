@@ -8,7 +8,9 @@ import pytest
 
 from tests.arm_worlds import bare_model
 from tests.torch_paths import START
+from weldsim.controller.calibration import Calibration
 from weldsim.errors import ExecutionError
+from weldsim.execution.config import ContractConfig
 from weldsim.execution.contract import Clause, check_contract, contract
 from weldsim.execution.gate import SafetyGate
 from weldsim.execution.simulated import SimulatedRobot
@@ -22,6 +24,38 @@ FACTS = RobotFacts(
 )
 STATE = RobotState(t=0.0, q=START, qd=np.zeros(6), X_BT=torch_pose(START), mode="running")
 BARE = Transform("FT", np.eye(3), np.zeros(3))
+
+
+# ROS driver issue 457: as a UR5 sent them. ros-industrial/universal_robot issue 357: corrections from a UR5's calibration.conf.
+PUBLISHED = np.array(
+    [
+        [-9.62699668632896e-06, -1.43707039992005, 2.02543119975016, -0.588254688694989, 4.13647390228702e-05, 8.1737464953645e-06],
+        [0.000279332356195598, -0.0566854832098269, -0.32646702272051, 1.49388687216263e-05, 2.23692592990586e-07, 0.0],
+        [0.0888794492754001, 574.241384579456, -507.363402098168, -66.7676839353205, 0.0949734691141216, 0.0825625014554953],
+        [1.57033858830411, -0.000733893428160216, 0.00325607356326439, 1.57040005185553, -1.57101000328584, 0.0],
+    ]
+).T
+ADDED = Calibration(
+    (
+        2.07750978653505926e-05,
+        0.96821571555565844,
+        -1.85685385014877657,
+        0.888647901450376643,
+        5.66106814887767e-05,
+        -7.4631076409646e-05,
+    ),
+    (0.000393621049984383038, 0.184093300397451837, 0.14493953300732923, -6.433e-05, 7.76709040084077299e-06, 0.0),
+    (
+        4.00263097760228e-05,
+        278.244144925623573,
+        -183.695513914913732,
+        -94.5471513669751289,
+        0.000304782681775556,
+        0.000123737941387467,
+    ),
+    (-0.000271624944216508624, 0.00125856505456124258, -0.00322052070697146503, 0.000651530165303837, -0.000587004657211176, 0.0),
+    2,
+).dh
 
 
 def moved(length: float, angle: float) -> Transform:
@@ -58,7 +92,8 @@ def test_our_own_arm_keeps_every_line() -> None:
         ({"version": "unknown"}, "controller", "update"),
         ({"series": "e", "version": "5.26.0"}, "controller", "update"),
         ({"series": "x"}, "controller", "not known"),
-        ({"dh": DH + np.array([[0, 0, 0.01, 0]] + [[0, 0, 0, 0]] * 5)}, "arm geometry", "calibration"),
+        ({"dh": DH + np.array([[0, 0, 0.003, 0]] + [[0, 0, 0, 0]] * 5)}, "arm geometry", "touch a measured point"),
+        ({"dh": DH + np.array([[0, 0, 0.01, 0]] + [[0, 0, 0, 0]] * 5)}, "arm geometry", "raise execution.contract.calibration"),
         ({"dh": np.array([[0, 0, 0.1625, np.pi / 2], *DH[1:]])}, "arm geometry", "another arm"),
         ({"X_FT": moved(0.0002, 0.0)}, "tool centre point", "TCP"),
         ({"X_FT": moved(0.0, 0.002)}, "tool centre point", "TCP"),
@@ -106,8 +141,18 @@ def test_a_report_that_is_wrong_breaks_its_line(state: RobotState, name: str, ad
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_factory_calibration_is_judged_by_where_it_puts_the_flange(seed: int) -> None:
-    assert not broken(contract(replace(FACTS, dh=calibrated(seed, 0.0003)), STATE))
-    assert broken(contract(replace(FACTS, dh=calibrated(seed, 0.01)), STATE)) == ["arm geometry"]
+    assert not broken(contract(replace(FACTS, dh=calibrated(seed, 0.0001)), STATE))
+    assert broken(contract(replace(FACTS, dh=calibrated(seed, 0.001)), STATE)) == ["arm geometry"]
+
+
+@pytest.mark.parametrize(("dh", "off"), [(PUBLISHED, 3.03), (ADDED, 3.34)])
+def test_published_figures_of_two_real_arms_put_the_flange_millimetres_off(dh: np.ndarray, off: float) -> None:
+    """Hundreds of metres of d cancel: only so if figures that were sent are whole, and those of calibration.conf added."""
+    facts = replace(FACTS, dh=dh, dh_note="calibrated")
+    clause = next(clause for clause in contract(facts, STATE) if clause.name == "arm geometry")
+    assert not clause.passed
+    assert clause.value == f"{off:.2f} mm from ours at the worst (calibrated)"
+    assert not broken(contract(facts, STATE, ContractConfig(calibration=0.0035)))
 
 
 def test_what_a_robot_cannot_say_is_not_held_against_it() -> None:

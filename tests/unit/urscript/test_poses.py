@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weldsim.controller.kinematics import jacobian, pose_joints, tcp_pose
+from weldsim.controller.kinematics import Kinematics
 from weldsim.frames import Transform
 from weldsim.kinematics import torch_pose
 from weldsim.mounts import X_FT
@@ -31,13 +31,14 @@ def test_pose_and_matrix_are_inverse_of_each_other_and_agree_with_frames(angle, 
 @pytest.mark.parametrize("seed", range(20))
 def test_forward_inverse_and_jacobian_agree_with_the_arm(seed):
     q = np.random.default_rng(seed).uniform(-2.5, 2.5, 6)
-    pose = tcp_pose(q.tolist(), X_FT.matrix)
+    arm = Kinematics()
+    pose = arm.tcp_pose(q.tolist(), X_FT.matrix)
     X = torch_pose(q)
     np.testing.assert_allclose(matrix_of(pose), X.matrix, atol=1e-9)
-    found = pose_joints(pose, X_FT.matrix, (q + 0.01).tolist())
+    found = arm.pose_joints(pose, X_FT.matrix, (q + 0.01).tolist())
     assert found is not None
-    np.testing.assert_allclose(tcp_pose(found, X_FT.matrix)[:3], X.p, atol=1e-7)
-    J, h = jacobian(q.tolist(), X_FT.matrix), 1e-6
+    np.testing.assert_allclose(arm.tcp_pose(found, X_FT.matrix)[:3], X.p, atol=1e-7)
+    J, h = arm.jacobian(q.tolist(), X_FT.matrix), 1e-6
     for joint in range(6):
         moved = torch_pose(q + h * np.eye(6)[joint])
         turn = Rotation.from_matrix(moved.R @ X.R.T).as_rotvec()

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from weldsim.controller.kinematics import pose_joints, tcp_matrix, tcp_pose
 from weldsim.controller.machine import Machine
 from weldsim.kinematics import JOINT_LIMIT
 from weldsim.urscript.check import is_pose, six
 from weldsim.urscript.errors import ScriptError
-from weldsim.urscript.poses import Matrix, matrix_of, pose_of
+from weldsim.urscript.poses import Matrix, matrix_of
 from weldsim.urscript.values import Pose
 
 REACH = 1.5  # [m] no TCP of this arm is farther from its base
@@ -25,7 +24,7 @@ class GeometryFunctions:
     def get_forward_kin(self, q: Any = None, tcp: Any = None) -> Pose:
         """The TCP's pose at joint angles q, now by default, with the active TCP by default."""
         joints = self._machine.arm.q if q is None else six(q, "q")
-        return Pose(tcp_pose(joints, self._tcp(tcp)))
+        return Pose(self._machine.kinematics.tcp_pose(joints, self._tcp(tcp)))
 
     def get_inverse_kin(
         self, x: Any, qnear: Any = None, maxPositionError: float = 1e-10, maxOrientationError: float = 1e-10, tcp: Any = None
@@ -43,7 +42,8 @@ class GeometryFunctions:
         return self._solve(x, qnear, tcp) is not None
 
     def _solve(self, x: Any, near: Any, tcp: Any) -> list[float] | None:
-        return pose_joints(six(x, "x"), self._tcp(tcp), self._machine.arm.q if near is None else six(near, "qnear"))
+        near = self._machine.arm.q if near is None else six(near, "qnear")
+        return self._machine.kinematics.pose_joints(six(x, "x"), self._tcp(tcp), near)
 
     def _tcp(self, tcp: Any) -> Matrix:
         return self._machine.tool.tcp_matrix if tcp is None or isinstance(tcp, str) else matrix_of(six(tcp, "tcp"))
@@ -56,4 +56,4 @@ class GeometryFunctions:
         return all(abs(q) <= JOINT_LIMIT for q in values)
 
     def get_actual_tool_flange_pose(self) -> Pose:
-        return Pose(pose_of(tcp_matrix(self._machine.arm.q, np.eye(4))))
+        return Pose(self._machine.kinematics.tcp_pose(self._machine.arm.q, np.eye(4)))

@@ -5,7 +5,6 @@ from math import hypot
 from typing import Any
 
 from weldsim.controller.errors import MotionFault
-from weldsim.controller.kinematics import pose_joints, tcp_pose
 from weldsim.controller.machine import Machine
 from weldsim.controller.reference import STOP_DECELERATION
 from weldsim.controller.trapezoid import Trapezoid
@@ -63,7 +62,7 @@ class MotionFunctions:
         self._joints_of(target)
         while True:
             yield from self._settle()
-            start = tcp_pose(self._reference.q, self._tcp)
+            start = self._machine.kinematics.tcp_pose(self._reference.q, self._tcp)
             way = hypot(*(new - old for new, old in zip(target[:3], start[:3], strict=True)))
             length = max(way, TURN_RADIUS * turn_between(start, target))
             profile = self._profile(length, v, a, t)
@@ -145,7 +144,7 @@ class MotionFunctions:
 
     def _pose(self, target: Any) -> list[float]:
         pose = six(target, "target")
-        return pose if is_pose(target) else tcp_pose(self._within(pose), self._tcp)
+        return pose if is_pose(target) else self._machine.kinematics.tcp_pose(self._within(pose), self._tcp)
 
     def _within(self, q: list[float]) -> list[float]:
         """Joint angles that are within their ranges. Raises ScriptError."""
@@ -155,13 +154,13 @@ class MotionFunctions:
         return q
 
     def _joints_of(self, pose: list[float]) -> list[float]:
-        q = pose_joints(pose, self._tcp, self._reference.q)
+        q = self._machine.kinematics.pose_joints(pose, self._tcp, self._reference.q)
         if q is None:
             raise ScriptError(f"the arm cannot reach p[{', '.join(f'{x:.4f}' for x in pose)}]")
         return q
 
     def _near(self, pose: list[float]) -> list[float]:
-        q = pose_joints(pose, self._tcp, self._reference.q)
+        q = self._machine.kinematics.pose_joints(pose, self._tcp, self._reference.q)
         if q is None:
             raise MotionFault(f"the arm cannot reach p[{', '.join(f'{x:.4f}' for x in pose)}] on its line")
         return q

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from weldsim.controller.kinematics import tcp_pose
 from weldsim.controller.machine import Machine
 from weldsim.urscript.check import six
 from weldsim.urscript.errors import ScriptError
@@ -41,10 +40,10 @@ class RobotFunctions:
         return list(history[max(0, len(history) - 1 - int(number(steps)))])
 
     def get_actual_tcp_pose(self) -> Pose:
-        return Pose(tcp_pose(self._machine.arm.q, self._machine.tool.tcp_matrix))
+        return Pose(self._machine.kinematics.tcp_pose(self._machine.arm.q, self._machine.tool.tcp_matrix))
 
     def get_target_tcp_pose(self) -> Pose:
-        return Pose(tcp_pose(self._machine.reference.q, self._machine.tool.tcp_matrix))
+        return Pose(self._machine.kinematics.tcp_pose(self._machine.reference.q, self._machine.tool.tcp_matrix))
 
     def get_target_waypoint(self) -> Pose:
         return self.get_target_tcp_pose()
