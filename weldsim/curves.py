@@ -7,6 +7,8 @@ from scipy.spatial import KDTree
 
 from weldsim.frames import unit
 
+SAME = 1e-9  # [m] ends of a polyline so near to one another make it a closed one
+
 
 def arc_length(points: Float[ndarray, "n d"]) -> Float[ndarray, "n"]:
     """Cumulative chord length from the first point [same unit as points]."""
@@ -44,8 +46,9 @@ def project(
     _, nearest = KDTree(points).query(queries)
     best = np.full(len(queries), np.inf)
     foot, at = np.empty((len(queries), queries.shape[1])), np.zeros(len(queries))
+    closed = len(points) > 2 and bool(np.linalg.norm(points[-1] - points[0]) <= SAME)  # its ends are each other's neighbours
     for shift in (-1, 0):
-        i = np.clip(nearest + shift, 0, len(points) - 2)
+        i = (nearest + shift) % (len(points) - 1) if closed else np.clip(nearest + shift, 0, len(points) - 2)
         a, d = points[i], points[i + 1] - points[i]
         u = np.clip(np.einsum("ij,ij->i", queries - a, d) / np.maximum(np.einsum("ij,ij->i", d, d), 1e-30), 0.0, 1.0)
         candidate = a + u[:, None] * d

@@ -1,14 +1,16 @@
 """Metrics: known offsets give known figures, and the way a line is posed, sampled or walked changes nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.seams import found_seam, left_of, sine_seam, torch_path, weld_log
-from weldsim.curves import arc_length, resample
+from weldsim.curves import arc_length, interpolate, project, resample
 from weldsim.frames import Transform, matrix_from_rotation_vector, unit
-from weldsim.records import KnownSeam
+from weldsim.records import ExecutionLog, KnownSeam, Segment
 from weldsim.report.metrics import across, known_offsets, line_error, match_seams, region_overlap, sigma_coverage
 from weldsim.report.tracking import SpeedRule, speed_error, tracking_error
 
@@ -169,6 +171,58 @@ def test_tracking_and_speed_see_what_was_put_in(seed: int, side: float, factor: 
     assert speed is not None
     assert abs(speed.max - abs(factor - 1)) < 2e-3
     assert speed_error(log, path, SpeedRule(ramp=1e3)) is None
+
+
+@few
+@given(seeds, st.floats(0.9, 1.1))
+def test_speed_is_judged_in_each_piece_of_an_interrupted_weld(seed: int, factor: float) -> None:
+    rng = np.random.default_rng(seed)
+    known = sine_seam(rng)
+    path = torch_path(found_seam(known, np.zeros(len(known.s)), every=1), speed=8e-3)
+    log = weld_log(path, rng, factor=factor)
+    burning = np.flatnonzero(log.arc_on)
+    cut = burning[rng.integers(len(burning) // 4, 3 * len(burning) // 4)]
+    # Between the pieces the torch is far off for a second, the arc out.
+    away = Transform("BT", np.repeat(log.X_BT_act.R[cut : cut + 1], 125, 0), log.X_BT_act.p[cut] + np.full((125, 3), 0.2))
+    log = _with_pause(log, int(cut), away)
+    speed = speed_error(log, path)
+    assert speed is not None
+    assert abs(speed.max - abs(factor - 1)) < 2e-3
+
+
+def _with_pause(log: ExecutionLog, at: int, away: Transform) -> ExecutionLog:
+    """The log with the instants of `away` put in before the one at `at`, the arc off."""
+    n = len(away.p)
+
+    def more(values: np.ndarray, extra: np.ndarray | None = None) -> np.ndarray:
+        filling = np.repeat(values[at : at + 1], n, axis=0) if extra is None else extra
+        return np.concatenate([values[:at], filling, values[at:]])
+
+    X = log.X_BT_act
+    return replace(
+        log,
+        q_cmd=more(log.q_cmd),
+        q_act=more(log.q_act),
+        qd_act=more(log.qd_act),
+        s_cmd=more(log.s_cmd),
+        torque=None if log.torque is None else more(log.torque),
+        t=log.period * np.arange(len(log.t) + n) + log.t[0],
+        X_BT_act=Transform("BT", more(X.R, away.R), more(X.p, away.p)),
+        arc_on=more(log.arc_on, np.zeros(n, bool)),
+        segments=(*log.segments[:at], *(Segment.AIR,) * n, *log.segments[at:]),
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_on_a_closed_polyline_is_off_it(seed: int) -> None:
+    # Its first and last points are one up to rounding: whichever is found the nearer, both their neighbours count.
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0, 2 * np.pi, rng.integers(6, 400))
+    points = 0.1 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points[-1] = points[0] + 1e-15 * rng.normal(size=3)
+    along = arc_length(points)
+    on = interpolate(along, points, np.concatenate([rng.uniform(0, along[-1], 300), along[[0, -1]]]))
+    assert project(on, points)[0].max() < 1e-9
 
 
 def test_wire_axes_are_interpolated_as_directions() -> None:

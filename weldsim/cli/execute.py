@@ -140,7 +140,7 @@ class Execute(ConfigOptions):
         print(f"{program.source}, {name}, on {done.robot}: {_word(done)}")
         if len(program.paths) > 1:
             print(f"  seam {self.seam} of {len(program.paths)}; --seam picks another")
-        for note in program.notes:
+        for note in (*program.notes, *(() if done.trial is None else done.trial.notes)):
             print(f"  {note}")
         rows = [[c.name, c.value, c.expected, MARKS[c.passed], c.advice if c.passed is False else ""] for c in done.clauses]
         print(table(rows, ("contract", "robot", "expected", "", "")))

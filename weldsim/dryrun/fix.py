@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +15,7 @@ from weldsim.dryrun.verdict import Fix, Trial
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
 from weldsim.motion.config import MotionConfig
+from weldsim.motion.cut import cut_path
 from weldsim.motion.rungs import turned
 from weldsim.records import Segment, TorchPath
 
@@ -72,8 +72,7 @@ def applied(fix: Fix, path: TorchPath, cell: Cell, config: MotionConfig) -> tupl
         case "lead-in":
             config = replace(config, approach=fix.approach)
         case "cut the weld":
-            edges = [float(path.s[0]), *fix.cut, float(path.s[-1])]
-            paths = tuple(piece(path, np.flatnonzero((path.s >= a - 1e-9) & (path.s <= b + 1e-9))) for a, b in pairwise(edges))
+            paths = tuple(cut_path(path, fix.cut))
     return paths, cell, config
 
 
@@ -215,13 +214,12 @@ def _cut(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> lis
     """The weld in pieces, where the search for a sweep said that this would help."""
     if not trial.split:
         return []
-    edges = [float(path.s[0]), *trial.split, float(path.s[-1])]
-    for a, b in pairwise(edges):
-        mine = np.flatnonzero((path.s >= a - 1e-9) & (path.s <= b + 1e-9))
-        if len(mine) < 2 or not try_path(piece(path, mine), trial.name, cell, config).passed:
-            return []
+    pieces = cut_path(path, trial.split)
+    if not all(try_path(piece, trial.name, cell, config).passed for piece in pieces):
+        return []
     where = ", ".join(f"{1e3 * s:.0f}" for s in trial.split)
-    return [Fix(kind="cut the weld", text=f"weld it in {len(edges) - 1} pieces, cut at s = {where} mm", cut=trial.split)]
+    text = f"weld it in {len(pieces)} pieces, cut at s = {where} mm (motion.pieces = {len(pieces)})"
+    return [Fix(kind="cut the weld", text=text, cut=trial.split)]
 
 
 def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress = lambda done: None) -> tuple[Fix, ...]:
@@ -257,19 +255,6 @@ def _changed(program: Program, turn: float = 0.0, move: Float[ndarray, "3"] | No
 def turned_about_wire(X_BT: Transform, turn: float) -> Transform:
     """The poses turned about their own z [rad]."""
     return Transform("BT", turned(X_BT.R, turn), X_BT.p)
-
-
-def piece(path: TorchPath, mine: ndarray) -> TorchPath:
-    """Some neighbouring poses of a path, as a path."""
-    return _with(
-        path,
-        X_BT=Transform("BT", path.X_BT.R[mine], path.X_BT.p[mine]),
-        s=path.s[mine],
-        speed=path.speed[mine],
-        arc_on=path.arc_on[mine],
-        segments=tuple(path.segments[i] for i in mine),
-        sigma=None if path.sigma is None else path.sigma[mine],
-    )
 
 
 def _quick(path: TorchPath, cell: Cell, config: MotionConfig) -> bool:

@@ -26,6 +26,7 @@ RANGES = {
     "joint_rate": (1.0, 1e5),
     "rolls": (1, 3600),
     "candidates": (1, 1000),
+    "pieces": (1, 100),
     "floor": (-2.0, 2.0),
     "clearance": (0.0, 1.0),
     "least_speed": (0.0, 1.0),
@@ -77,6 +78,8 @@ class MotionConfig:
     """How many rotations about the wire are tried at each place."""
     candidates: int = 8
     """How many ways to hold the arm are followed before the path is called infeasible."""
+    pieces: int = 4
+    """Into how many pieces a weld may be cut, the arc off in between, where no single sweep of the arm covers it; 1: never."""
     floor: Metre = 0.0
     """Height of the table top in the base frame."""
     clearance: Metre = 0.08

@@ -6,11 +6,12 @@ continuity, and become nodes of their own only for a joint that would run into i
 paths, after the ladder graph of De Maeyer, Moyaers and Demeester 2017).
 """
 
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
@@ -80,52 +81,110 @@ def climb(
     """
     limit = JOINT_LIMIT - config.limit_margin
     cost = rungs.cost if banned is None else np.where(banned, np.inf, rungs.cost)
+    found = _searched(replace(rungs, cost=cost), q_start, limit)
+    if found is None:
+        return None
+    q, roll, branch, best = found
+    q, roll = _smoothed(rungs, q, roll, branch, X_FT, limit, blocked)
+    return Hold(s=rungs.s, q=q, roll=roll, branch=branch, cost=best, rest=CubicSpline(rungs.s, q))
+
+
+def _searched(
+    rungs: Rungs, q_start: Float[ndarray, "6"], limit: float
+) -> tuple[Float[ndarray, "w 6"], Float[ndarray, "w"], int, float] | None:
+    """Joint angles, rotation about the wire, branch and cost of the cheapest climb; None where there is none."""
     wound: tuple[int, ...] = ()  # joints whose whole turns are nodes
     while True:
-        search = _forward(rungs.q, cost, q_start, wound, limit)
+        search = _forward(rungs.q, rungs.cost, q_start, wound, limit)
         if not np.isfinite(search.total[-1]).any():
             return None
         roll, branch, lifted = _descended(rungs, search)
         q, over = _within(lifted, q_start, wound, limit)
         if q is not None:
-            best = float(search.total[-1].min())
-            q, roll = _smoothed(rungs, q, roll, branch, X_FT, limit, blocked)
-            return Hold(s=rungs.s, q=q, roll=roll, branch=branch, cost=best, rest=CubicSpline(rungs.s, q))
+            return q, roll, branch, float(search.total[-1].min())
         wound = (*wound, *over)
 
 
-def cuts(rungs: Rungs) -> list[float] | None:
+def cuts(rungs: Rungs, limit: float, weld: tuple[float, float]) -> list[float] | None:
     """Arc lengths [m] at which a weld that no single climb covers is best cut into pieces that each have one.
 
-    Two pieces are cut where both together cost least; where it takes more, each piece is as long as can be. None where some
-    place has no posture at all; an empty list where one climb will do.
+    Two pieces are cut where both together cost least; where it takes more, each is as long as can be. Where joints would be wound
+    up into their end stops the pieces are of one length if that will do.
+
+    Args:
+        limit: greatest joint angle [rad].  weld: where it begins and ends [m]: leads are not cut.
+    Returns:
+        None where no cuts help; an empty list where one climb will do.
     """
     if rungs.first_refused is not None:
         return None
-    nowhere = np.full(6, np.nan)
-    up = _forward(rungs.q, rungs.cost, nowhere, (), np.inf).total.min(axis=(1, 2, 3))
+    inside = np.flatnonzero((rungs.s > weld[0] + 1e-9) & (rungs.s < weld[1] - 1e-9))
+    up = _ways(rungs)
     if np.isfinite(up[-1]):
-        return []
-    down = _forward(rungs.q[::-1], rungs.cost[::-1], nowhere, (), np.inf).total.min(axis=(1, 2, 3))[::-1]
-    inner = slice(1, len(up) - 1)
-    if np.isfinite(up[inner] + down[inner]).any():
-        return [float(rungs.s[inner][(up[inner] + down[inner]).argmin()])]
+        return _wound_cuts(rungs, limit, inside)
+    down = _ways(replace(rungs, q=rungs.q[::-1], cost=rungs.cost[::-1]))[::-1]
+    if np.isfinite(up[inside] + down[inside]).any():
+        return [float(rungs.s[inside][(up[inside] + down[inside]).argmin()])]
+    return _longest_pieces(rungs, inside, lambda first: first + int(np.flatnonzero(np.isfinite(_ways(_part(rungs, first))))[-1]))
+
+
+def _wound_cuts(rungs: Rungs, limit: float, inside: Int[ndarray, "m"]) -> list[float] | None:
+    """Cuts of a weld along which joints would be wound up into their end stops."""
+    longest = _longest_pieces(rungs, inside, lambda first: _furthest(rungs, first, limit))
+    if not longest:
+        return longest
+    even = inside[np.linspace(0, len(inside) - 1, len(longest) + 2).round().astype(int)[1:-1]]
+    edges = [0, *even.tolist(), len(rungs.s) - 1]
+    if all(_furthest(rungs, a, limit, b) == b for a, b in pairwise(edges)):
+        return [float(s) for s in rungs.s[even]]
+    return longest
+
+
+def _longest_pieces(rungs: Rungs, inside: Int[ndarray, "m"], furthest: Callable[[int], int]) -> list[float] | None:
+    """Cuts at rungs of `inside` between pieces that are each as long as can be, `furthest` being the last rung climbed to from one;
+    None where they get nowhere."""
     out, first = [], 0
-    while True:
-        up = _forward(rungs.q[first:], rungs.cost[first:], nowhere, (), np.inf).total.min(axis=(1, 2, 3))
-        if np.isfinite(up[-1]):
-            return out
-        last = first + int(np.flatnonzero(np.isfinite(up))[-1])
-        if last == first:
+    while (last := furthest(first)) < len(rungs.s) - 1:
+        if len(inside) == 0 or last > inside[-1]:  # what is left over is a lead: it needs some of the weld with it
+            last = (first + last) // 2
+        if last <= first or last not in inside:
             return None
         out.append(float(rungs.s[last]))
         first = last
+    return out
 
 
-def break_at(rungs: Rungs) -> tuple[float, float]:
+def _furthest(rungs: Rungs, first: int, limit: float, end: int | None = None) -> int:
+    """The last rung, up to `end`, that can be climbed to from `first` with every joint within its limit."""
+    nowhere = np.full(6, np.nan)
+    step = len(rungs.s) - 1 if end is None else end
+    low, high = first, step + 1  # climbed to, and not
+    while high - low > 1:
+        good = _searched(_part(rungs, first, step + 1), nowhere, limit) is not None
+        low, high = (step, high) if good else (low, step)
+        step = (low + high) // 2
+    return low
+
+
+def _part(rungs: Rungs, first: int, end: int | None = None) -> Rungs:
+    """Rungs from `first` to before `end`."""
+    mine = slice(first, end)
+    parts = {name: getattr(rungs, name)[mine] for name in ("s", "frames", "p", "q", "cost", "refusals")}
+    return replace(rungs, **parts)
+
+
+def _ways(rungs: Rungs) -> Float[ndarray, "w"]:
+    """Cost of the cheapest way to each rung from the first, end stops apart; inf where there is none."""
+    return _forward(rungs.q, rungs.cost, np.full(6, np.nan), (), np.inf).total.min(axis=(1, 2, 3))
+
+
+def break_at(rungs: Rungs, limit: float) -> tuple[float, float]:
     """Arc length of the last rung that can be climbed to from the first, and of the next one [m]."""
-    up = _forward(rungs.q, rungs.cost, np.full(6, np.nan), (), np.inf).total.min(axis=(1, 2, 3))
-    last = int(np.flatnonzero(np.isfinite(up))[-1]) if np.isfinite(up).any() else 0
+    up = _ways(rungs)
+    if np.isfinite(up[-1]):
+        last = _furthest(rungs, 0, limit)
+    else:
+        last = int(np.flatnonzero(np.isfinite(up))[-1]) if np.isfinite(up).any() else 0
     return float(rungs.s[last]), float(rungs.s[min(last + 1, len(rungs.s) - 1)])
 
 

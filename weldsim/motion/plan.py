@@ -12,6 +12,7 @@ from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
 from weldsim.motion.air import air_moves
 from weldsim.motion.arm import clearances, dexterity, kinematic_model
 from weldsim.motion.config import MotionConfig
+from weldsim.motion.cut import cut_path
 from weldsim.motion.follow import JointPath, LostPathError, check_clear, follow
 from weldsim.motion.ladder import Hold, climb, near
 from weldsim.motion.rail import Rail, make_rail
@@ -37,6 +38,7 @@ class MotionPlan:
         slowest_at: arc length where [m].
         ramp: length at the ends of the weld in which the torch speeds up and slows down [m].
         dexterity, clearance: least on the way [m/rad], [m].  roll: rotation about the wire at the start [rad].
+        cuts: where the weld is interrupted because no single sweep of the arm covers it [m]; the leads there are not on `rail`.
         notes: one sentence each, for people.
     """
 
@@ -50,6 +52,7 @@ class MotionPlan:
     dexterity: float
     clearance: float
     roll: float
+    cuts: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -61,6 +64,9 @@ def plan_motion(
     blocked: Blocked | None = None,
 ) -> MotionPlan:
     """The joint trajectory that welds the path: air move, lead-in, weld at the path's speed, lead-out, air move home.
+
+    Where no single sweep of the arm covers the weld it is cut at the best places, into `config.pieces` at most; the arm goes from
+    one piece to the next through the air.
 
     Args:
         path: torch poses; leads are added along the wire where it has none.
@@ -77,8 +83,66 @@ def plan_motion(
     if not inside.all():
         joint = int(np.flatnonzero(~inside)[0])
         raise MotionError(f"start: {JOINT_NAMES[joint]} at {np.rad2deg(q_start[joint]):.0f} deg (limit +-360 deg)", joint=joint)
+    try:
+        return _in_one(path, q_start, q_start if config.return_home else None, config, X_FT, blocked)
+    except MotionError as error:
+        split = error.data.get("split")
+        if not isinstance(split, tuple) or not split:
+            raise
+        pieces = f"in {len(split) + 1} pieces, cut at s = {', '.join(f'{1e3 * s:.0f}' for s in split)} mm"
+        if len(split) >= config.pieces:
+            raise MotionError(f"{error}; weld it {pieces} (motion.pieces = {len(split) + 1})", **error.data) from None
+        try:
+            return _in_pieces(path, split, q_start, config, X_FT, blocked)
+        except MotionError as second:
+            why = f"{second.data.get('reason', second)} at s = {1e3 * float(str(second.data.get('s', 0.0))):.1f} mm"
+            raise MotionError(f"{error}; nor does it go {pieces}: {why}", **{**error.data, "split": ()}) from None
+
+
+def _in_pieces(
+    path: TorchPath,
+    split: tuple[float, ...],
+    q_start: Float[ndarray, "6"],
+    config: MotionConfig,
+    X_FT: Transform,
+    blocked: Blocked | None,
+) -> MotionPlan:
+    """The plan of a path cut at arc lengths `split` [m], one piece after the other."""
+    plans, q, pieces = [], q_start, cut_path(path, split)
+    for piece in pieces:
+        home = q_start if config.return_home and piece is pieces[-1] else None
+        plans.append(_in_one(piece, q, home, config, X_FT, blocked))
+        q = plans[-1].trajectory.q[-1]
+    slowest = min(plans, key=lambda plan: plan.slowest)
+    where = ", ".join(f"{1e3 * s:.0f}" for s in split)
+    note = f"no single sweep of the arm covers the weld: it is cut into {len(plans)} pieces, at s = {where} mm; the arc stops there"
+    return MotionPlan(
+        trajectory=_joined([plan.trajectory for plan in plans], config.period),
+        rail=make_rail(path, config),
+        position_error=max(plan.position_error for plan in plans),
+        axis_error=max(plan.axis_error for plan in plans),
+        slowest=slowest.slowest,
+        slowest_at=slowest.slowest_at,
+        ramp=max(plan.ramp for plan in plans),
+        dexterity=min(plan.dexterity for plan in plans),
+        clearance=min(plan.clearance for plan in plans),
+        roll=plans[0].roll,
+        cuts=split,
+        notes=(note, *dict.fromkeys(text for plan in plans for text in plan.notes)),
+    )
+
+
+def _in_one(
+    path: TorchPath,
+    q_start: Float[ndarray, "6"],
+    q_home: Float[ndarray, "6"] | None,
+    config: MotionConfig,
+    X_FT: Transform,
+    blocked: Blocked | None,
+) -> MotionPlan:
+    """The plan of a path in a single sweep, from q_start and in the end to q_home, where that is given."""
     rail = make_rail(path, config)
-    hold, paths, moves = _first_that_holds(rail, q_start, X_FT, config, blocked)
+    hold, paths, moves = _first_that_holds(rail, q_start, q_home, X_FT, config, blocked)
     q = np.concatenate([path.spline(path.spline.x) for path in paths])
     clearance = float(clearances(q, config.floor, X_FT).min())
     weld = next(move for move in moves if move.segment == Segment.WELD)
@@ -107,7 +171,12 @@ def plan_motion(
 
 
 def _first_that_holds(
-    rail: Rail, q_start: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
+    rail: Rail,
+    q_start: Float[ndarray, "6"],
+    q_home: Float[ndarray, "6"] | None,
+    X_FT: Transform,
+    config: MotionConfig,
+    blocked: Blocked | None,
 ) -> tuple[Hold, list[JointPath], list[Move]]:
     """The best way to hold the arm that can be followed all along and reached through the air, with its joint paths and moves.
 
@@ -126,7 +195,7 @@ def _first_that_holds(
             paths = follow(rail, hold.q[0], hold.rest, model, X_FT, config)
             if blocked is not None:
                 check_clear(paths, blocked)
-            return hold, paths, _moves(rail, paths, q_start, X_FT, config, blocked)
+            return hold, paths, _moves(rail, paths, q_start, q_home, X_FT, config, blocked)
         except LostPathError as error:
             lost.append(error)
             banned |= near(rungs, hold, float(str(error.data["s"])), reach=1 + attempt)
@@ -147,6 +216,7 @@ def _moves(
     rail: Rail,
     paths: list[JointPath],
     q_start: Float[ndarray, "6"],
+    q_home: Float[ndarray, "6"] | None,
     X_FT: Transform,
     config: MotionConfig,
     blocked: Blocked | None,
@@ -155,7 +225,7 @@ def _moves(
     moves = [piece_move(rail, piece, config) for piece in paths]
     first, last = moves[0], moves[-1]
     there = air_moves(q_start, first.q[0], float(first.s[0]), X_FT, config, blocked)
-    home = air_moves(q_start, last.q[-1], float(last.s[-1]), X_FT, config, blocked, back=True) if config.return_home else []
+    home = [] if q_home is None else air_moves(q_home, last.q[-1], float(last.s[-1]), X_FT, config, blocked, back=True)
     return [*there, *moves, *home]
 
 
@@ -177,5 +247,24 @@ def _join(moves: list[Move], path: TorchPath, rail: Rail, config: MotionConfig) 
         s=s,
         arc_on=arc,
         segments=tuple(segments),
+        joint_names=JOINT_NAMES,
+    )
+
+
+def _joined(trajectories: list[JointTrajectory], period: float) -> JointTrajectory:
+    """One after the other; each starts at rest where the last one ended."""
+    keep = [slice(0, None)] + [slice(1, None)] * (len(trajectories) - 1)
+    pairs = list(zip(trajectories, keep, strict=True))
+    q, qd, qdd, s, arc = (
+        np.concatenate([getattr(one, name)[mine] for one, mine in pairs]) for name in ("q", "qd", "qdd", "s", "arc_on")
+    )
+    return JointTrajectory(
+        t=period * np.arange(len(s)),
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        s=s,
+        arc_on=arc,
+        segments=tuple(segment for one, mine in pairs for segment in one.segments[mine]),
         joint_names=JOINT_NAMES,
     )

@@ -4,7 +4,7 @@ import numpy as np
 
 from weldsim.errors import MotionError, UnreachableError
 from weldsim.frames import Transform
-from weldsim.kinematics import D1, REACH, inverse
+from weldsim.kinematics import D1, JOINT_LIMIT, REACH, inverse
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.ladder import break_at, cuts
 from weldsim.motion.rail import Rail
@@ -17,7 +17,7 @@ def refused(rail: Rail, rungs: Rungs, X_FT: Transform, config: MotionConfig) -> 
     """The error that says why there is no climb over the rungs; `data`: index, s, reason, why, and split where a cut would help."""
     first = rungs.first_refused
     if first is None:
-        return _broken(rail, rungs)
+        return _broken(rail, rungs, JOINT_LIMIT - config.limit_margin)
     refusal, s = rungs.refusals[first], float(rungs.s[first])
     if refusal is not None and refusal.why == "unreachable":
         return unreachable(rail, _first_unreachable(rail, float(rungs.s[max(first - 1, 0)]), s, X_FT.inverse(), config))
@@ -40,22 +40,19 @@ def refused(rail: Rail, rungs: Rungs, X_FT: Transform, config: MotionConfig) -> 
     )
 
 
-def _broken(rail: Rail, rungs: Rungs) -> MotionError:
-    """Every place has a posture, but no continuous motion joins them all."""
-    last, after = break_at(rungs)
-    split = cuts(rungs)
-    inside = [s for s in split or [] if rail.start < s < rail.end]
-    if inside and split == inside:
-        advice = f"weld it in {len(inside) + 1} pieces, cut at s = {', '.join(f'{1e3 * s:.0f}' for s in inside)} mm"
-    else:
-        advice = "move the part or change the torch angles"
+def _broken(rail: Rail, rungs: Rungs, limit: float) -> MotionError:
+    """Every place has a posture, but no continuous motion joins them all; `data`: split, cuts between which motions do [m]."""
+    last, after = break_at(rungs, limit)
+    split = tuple(cuts(rungs, limit, (rail.start, rail.end)) or ())
+    advice = "" if split else "; move the part or change the torch angles"
     return MotionError(
-        f"{where(rail, after)}: no sweep of the arm without branch flip or collision goes beyond s = {1e3 * last:.1f} mm; {advice}",
+        f"{where(rail, after)}: no sweep of the arm without branch flip, collision or end stop goes beyond"
+        f" s = {1e3 * last:.1f} mm{advice}",
         index=rail.path_index(after),
         s=after,
         reason="branch flip",
         why="joint jump",
-        split=tuple(inside) if split == inside else (),
+        split=split,
     )
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from weldsim.frames import unit
@@ -87,12 +87,13 @@ def speed_error(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = Non
     t = log.t[on]
     half = rule.window / 2
     p = log.X_BT_act.p
-    # Near arc start and stop the window is cut off, so that approach and retract do not leak in.
-    times = [np.clip(t + h, t[0], t[-1]) for h in (-half, half)]
+    # Near arc start and stop, of every piece of a weld, the window is cut off, so that approach and retract do not leak in.
+    lit, out = _arc_times(on, log.t)
+    times = [np.clip(t + h, lit, out) for h in (-half, half)]
     before, after = (np.stack([np.interp(at, log.t, column) for column in p.T], axis=1) for at in times)
-    speed = np.linalg.norm(after - before, axis=1) / (times[1] - times[0])
+    speed = np.linalg.norm(after - before, axis=1) / np.maximum(times[1] - times[0], 1e-9)
     planned = np.interp(log.s_cmd[on], path.s, path.speed)
-    judged = (t >= t[0] + rule.ramp) & (t <= t[-1] - rule.ramp)
+    judged = (t >= lit + rule.ramp) & (t <= out - rule.ramp)
     if not judged.any():
         return None
     error = np.abs(speed - planned)[judged] / planned[judged]
@@ -104,6 +105,13 @@ def speed_error(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = Non
         planned=planned,
         judged=judged,
     )
+
+
+def _arc_times(on: Int[ndarray, "k"], t: Float[ndarray, "n"]) -> tuple[Float[ndarray, "k"], Float[ndarray, "k"]]:
+    """For each instant at which the arc burns, when it was lit and when it will go out [s]."""
+    first = np.concatenate([[True], np.diff(on) > 1])
+    piece = np.cumsum(first) - 1
+    return t[on[first]][piece], t[on[np.concatenate([first[1:], [True]])]][piece]
 
 
 def thinned(log: ExecutionLog) -> tuple[Float[ndarray, "m 3"], Float[ndarray, "m 3"]]:

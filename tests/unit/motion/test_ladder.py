@@ -21,6 +21,7 @@ from weldsim.path.plan import plan_path
 from weldsim.records import KnownSeam, Seam, TorchPath
 from weldsim.scene.world import World, build_world
 
+LIMIT, EVERYWHERE = 2 * np.pi - 0.1, (-1.0, 1.0)  # [rad], [m]
 ROUNDED = 0.008  # [m] to either side, over which the seam's corners are averaged
 
 
@@ -136,15 +137,15 @@ def test_a_weld_is_cut_where_its_pieces_are_cheapest(at: int) -> None:
     cost[at + 1 : 31, 0] += 1.0
     rungs = _ladder(angles, cost)
     assert climb(rungs, np.zeros(6), X_FT, MotionConfig()) is None
-    assert cuts(rungs) == [pytest.approx(0.01 * at)]
+    assert cuts(rungs, LIMIT, EVERYWHERE) == [pytest.approx(0.01 * at)]
 
 
 def test_one_climb_needs_no_cut_and_a_gap_cannot_be_cut() -> None:
     angles, cost = np.zeros((10, 1)), np.zeros((10, 1))
-    assert cuts(_ladder(angles, cost)) == []
+    assert cuts(_ladder(angles, cost), LIMIT, EVERYWHERE) == []
     jump = angles.copy()
     jump[5:] = 2.0
-    assert cuts(_ladder(jump, cost)) is None  # no rung has both
+    assert cuts(_ladder(jump, cost), LIMIT, EVERYWHERE) is None  # no rung has both
 
 
 @pytest.mark.parametrize("seed", range(10))
