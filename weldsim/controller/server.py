@@ -10,7 +10,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from weldsim.controller.connection import Connection, Session, Stream
+from weldsim.controller.connection import Connection, Session
 from weldsim.controller.dashboard import Dashboard, DashboardSession
 from weldsim.controller.faults import FaultSession
 from weldsim.controller.functions import builtins
@@ -106,8 +106,8 @@ class Server:
         if not self._stalled:
             for connection in self._connections:
                 # A client that does not keep up loses packets, never parts of one.
-                if isinstance(connection.session, Stream) and not connection.behind:
-                    connection.send(connection.session.data())
+                if connection.stream is not None and not connection.behind:
+                    connection.send(connection.stream.data())
         self._forget_closed()
         self.machine.busy = time.perf_counter() - began
 
