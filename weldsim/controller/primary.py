@@ -42,7 +42,7 @@ class PrimarySession:
         now = time.perf_counter()
         if now < self._due:
             return b""
-        self._due = max(self._due + PERIOD, now)
+        self._due = now + PERIOD
         first, self._told = not self._told, True
         return (self._version() if first else b"") + self._state()
 

@@ -103,17 +103,16 @@ def test_a_program_moves_the_calibrated_arm_to_the_pose_itself() -> None:
 
 def test_the_primary_port_tells_its_arm_ten_times_a_second_and_takes_programs() -> None:
     machine = new_machine(config=ControllerConfig(calibration=calibrated(0.003)))
+    began, sent, times = time.perf_counter(), b"", []
     session = PrimarySession(machine)
     assert session.greeting() == b""
     assert session.data() == b""
-    began, sent, times = time.perf_counter(), b"", []
     while len(times) < 3:
         if data := session.data():
             sent += data
             times.append(time.perf_counter() - began)
         time.sleep(0.001)
-    assert times[0] >= 0.9 * PERIOD
-    assert np.diff(times).min() > 0.5 * PERIOD
+    assert (np.array(times) >= PERIOD * np.arange(1, 4)).all()
     messages = list(MessageReader().feed(sent))
     assert [kind for kind, _ in messages] == [ROBOT_MESSAGE, ROBOT_STATE, ROBOT_STATE, ROBOT_STATE]
     assert b"URControl\x03\x0f" in messages[0][1]

@@ -34,7 +34,7 @@ MODE = framed(MODE_DATA, bytes(42))
 STATE = framed(ROBOT_STATE, MODE + framed(KINEMATICS_INFO, INFO.encode()) + framed(7, bytes(56)))
 VERSION = framed(ROBOT_MESSAGE, bytes(50))
 OTHER = VERSION + framed(ROBOT_STATE, MODE)  # what says nothing of the arm
-PROMPT = 0.15  # [s] on a busy machine
+PROMPT = 0.3  # [s] on a busy machine
 
 
 def figures(stream: bytes) -> KinematicsInfo | None:
