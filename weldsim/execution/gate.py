@@ -18,9 +18,12 @@ from weldsim.execution.config import GateConfig
 from weldsim.execution.limits import HISTORY, Breach, motion_breach, off_the_way
 from weldsim.execution.robot import Robot
 from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_NAMES, torch_pose
+from weldsim.kinematics import JOINT_NAMES, torch_tip
 from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import Event, JointTrajectory, RobotFacts, RobotState, Segment
+
+
+PASSED = 4000  # states kept for `passed_over`: 8 s at 500 Hz
 
 
 @final
@@ -49,6 +52,9 @@ class SafetyGate(Robot):
         self.black_box: Path | None = None
         self._folder, self._X_FT = folder, X_FT
         self._events: list[Event] = []
+        self._passed: deque[tuple[RobotState, bool]] = deque(maxlen=PASSED)
+        self._looked: tuple[RobotState, bool] | None = None  # the newest that the gate itself has seen
+        self._shown: RobotState | None = None  # the newest that the caller has seen
         self._connected, self._asked, self._segment, self._s = False, False, Segment.AIR, 0.0
         self._forget()
 
@@ -68,6 +74,9 @@ class SafetyGate(Robot):
         if self.inner.period != self.period:  # which some learn only now
             self.period = self.inner.period
             self._box = BlackBox(self.config.memory, self.period, self.name)
+        self._passed.clear()
+        self._looked = self._shown = None
+        self.inner.passed_over()  # what is left of an earlier connection
         self._forget()
 
     def disconnect(self) -> None:
@@ -79,7 +88,8 @@ class SafetyGate(Robot):
         return self
 
     def state(self) -> RobotState:
-        return self.inner.state()
+        self._shown = self.inner.state()
+        return self._shown
 
     def facts(self) -> RobotFacts:
         return self.inner.facts()
@@ -88,7 +98,16 @@ class SafetyGate(Robot):
         return self.inner.torque()
 
     def passed_over(self) -> tuple[tuple[RobotState, bool], ...]:
-        return self.inner.passed_over()
+        """The inner robot's, and those that the gate alone has looked at."""
+        self._catch_up()
+        shown = self._shown
+        if shown is None:
+            return ()
+        if self._looked is None or shown.t > self._looked[0].t:
+            self._see(shown, *self._command(shown))
+        passed = tuple(pair for pair in self._passed if pair[0].t < shown.t)
+        self._passed = deque((pair for pair in self._passed if pair[0].t > shown.t), PASSED)
+        return passed
 
     def events(self) -> tuple[Event, ...]:
         """The inner robot's, and the gate's own: stops."""
@@ -134,7 +153,7 @@ class SafetyGate(Robot):
         q = np.concatenate(
             [np.repeat(trajectory.q[:1], HISTORY, axis=0), trajectory.q, np.repeat(trajectory.q[-1:], HISTORY, axis=0)]
         )
-        found = motion_breach(q, np.concatenate([rest, trajectory.qd, rest]), torch_pose(q, self._X_FT).p, self.period, self.config)
+        found = motion_breach(q, np.concatenate([rest, trajectory.qd, rest]), torch_tip(q, self._X_FT), self.period, self.config)
         if found is not None:
             row, breach = found
             i = min(row - HISTORY, len(trajectory.t) - 1)
@@ -167,10 +186,11 @@ class SafetyGate(Robot):
             raise
         except Exception as error:
             raise self._defect(error) from error
+        state = self._reported()
+        self._catch_up()
         self._sent.append((q, qd, tip))
         self._way.append((q, tip))
-        state = self._reported()
-        self._record(state, q, qd)
+        self._see(state, q, qd)
         self._keep(self.inner.events())
         self._after(state)
         return sent
@@ -185,11 +205,11 @@ class SafetyGate(Robot):
             bad = int((~np.isfinite(np.concatenate([q, qd]))).argmax()) % 6
             text = f"{JOINT_NAMES[bad]} is told a number that is not finite"
             self._breach(Breach(rule="command", what=JOINT_NAMES[bad], value=float("nan"), limit=0.0, text=text))
-        tip = torch_pose(q, self._X_FT).p
+        tip = torch_tip(q, self._X_FT)
         if not self._sent:
             origin = q if self._origin is None else self._origin
             self._check_start(self._reported(), origin, moving=True)
-            self._sent.extend([(origin, np.zeros(6), torch_pose(origin, self._X_FT).p)] * HISTORY)
+            self._sent.extend([(origin, np.zeros(6), torch_tip(origin, self._X_FT))] * HISTORY)
             self._origin = None
         rows = [*self._sent, (q, qd, tip)]
         columns = [np.stack(column) for column in zip(*rows, strict=True)]
@@ -230,7 +250,7 @@ class SafetyGate(Robot):
 
     def _check_tip(self, state: RobotState) -> None:
         # By our kinematics, as the commands are: a controller's own, calibrated, differ from them by more than an arm strays.
-        tip = torch_pose(state.q, self._X_FT).p
+        tip = torch_tip(state.q, self._X_FT)
         off = float(np.linalg.norm(off_the_way(tip, np.array([p for _, p in self._way]))))
         if off > self.config.tracking_tip:
             text = f"torch tip is {1e3 * off:.2f} mm off the weld (limit {1e3 * self.config.tracking_tip:.2f} mm)"
@@ -311,7 +331,9 @@ class SafetyGate(Robot):
                 self._keep([Event(t=t, kind="fault", text=f"{name}: {type(error).__name__}: {error}")])
         try:
             self._keep(self.inner.events())
-            self._record(at_rest := self.inner.state(), at_rest.q, np.zeros(6))
+            at_rest = self.inner.state()
+            self._catch_up()
+            self._see(at_rest, at_rest.q, np.zeros(6))
         except Exception as error:
             self._keep([Event(t=t, kind="fault", text=f"no report after the stop: {type(error).__name__}: {error}")])
         self._forget()
@@ -323,8 +345,26 @@ class SafetyGate(Robot):
         except WeldsimError as error:
             self._keep([Event(t=t, kind="fault", text=f"black box: {error}")])
 
-    def _record(self, state: RobotState, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> None:
-        row = BlackBoxRow(q=q, qd=qd, state=state, arc_asked=self._asked, arc=self.arc, s=self._s, segment=self._segment)
+    def _see(self, state: RobotState, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> None:
+        """The newest report, into the black box; it is passed over where the caller sees a newer one only."""
+        if self._looked is None or state.t > self._looked[0].t:
+            self._looked = state, self.arc
+            self._passed.append(self._looked)
+        self._record(state, self.arc, q, qd)
+
+    def _catch_up(self) -> None:
+        """What the inner robot has reported since, which nobody had time to look at: it belongs to the command before."""
+        for state, arc in self.inner.passed_over():
+            if self._looked is None or state.t > self._looked[0].t:
+                self._passed.append((state, arc))
+                self._record(state, arc, *self._command(state))
+
+    def _command(self, state: RobotState) -> tuple[Float[ndarray, "6"], Float[ndarray, "6"]]:
+        """What was sent last, q and qd; rest where the arm is when nothing was."""
+        return self._sent[-1][:2] if self._sent else (state.q, np.zeros(6))
+
+    def _record(self, state: RobotState, arc: bool, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> None:
+        row = BlackBoxRow(q=q, qd=qd, state=state, arc_asked=self._asked, arc=arc, s=self._s, segment=self._segment)
         self._box.rows.append(row)
 
     def _keep(self, events: "tuple[Event, ...] | list[Event]") -> None:

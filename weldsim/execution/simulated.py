@@ -6,6 +6,7 @@ The torch pose is read from the physics.
 """
 
 import copy
+from collections import deque
 from collections.abc import Callable
 from typing import final
 
@@ -22,6 +23,8 @@ from weldsim.kinematics import DH, JOINT_NAMES
 from weldsim.mounts import PAYLOAD, PAYLOAD_COG, X_FT
 from weldsim.records import Event, RobotFacts, RobotState
 
+HOLD = 10  # periods at the end of a stop
+PASSED = 2000  # states kept for `passed_over`
 BASE_BODY, FLANGE_BODY, TORCH_SITE = "ur5_base", "wrist_3_link", "torch_tip"
 
 FrameCallback = Callable[["SimulatedRobot"], None]
@@ -90,6 +93,7 @@ class SimulatedRobot(Robot):
         self._q_ref, self._qd_ref = np.array(q_start, float), np.zeros(6)
         self._touching: set[tuple[str, str]] = set()
         self._events: list[Event] = []
+        self._passed: deque[tuple[RobotState, bool]] = deque(maxlen=PASSED)
         self._next_frame = self.config.frame_period
         self.t = 0.0
         base_R, base_p = self.data.xmat[self._base].reshape(3, 3), self.data.xpos[self._base]
@@ -138,6 +142,12 @@ class SimulatedRobot(Robot):
     def arc(self) -> bool:
         return self._arc
 
+    def passed_over(self) -> tuple[tuple[RobotState, bool], ...]:
+        """The way to rest of a stop."""
+        passed = tuple(pair for pair in self._passed if pair[0].t < self.t)
+        self._passed.clear()
+        return passed
+
     def events(self) -> tuple[Event, ...]:
         happened, self._events = tuple(self._events), []
         return happened
@@ -152,11 +162,10 @@ class SimulatedRobot(Robot):
         self._arc = False
         speed = float(np.abs(self._qd_ref).max())
         n = int(np.ceil(speed / self.config.stop_deceleration / self.period))
-        for k in range(n, 0, -1):
+        for k in [*range(n, 0, -1), *[1] * HOLD]:
             qd = self._qd_ref * (k - 1) / k
             self._advance(self._q_ref + (self._qd_ref + qd) / 2 * self.period, qd)
-        for _ in range(10):
-            self._advance(self._q_ref, np.zeros(6))
+            self._passed.append((self.state(), False))
 
     def _advance(self, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> None:
         """One period of physics, the reference running from the last command to (q, qd) on a cubic."""

@@ -87,6 +87,7 @@ class UrRobot(Robot):
         self._link, self._trouble, self.period = link, None, link.period
         self._origin, self._sample = link.first.timestamp, link.first
         self._events, self._arc, self._arc_asked = [], False, 0
+        self._taken.clear()
         self._sent = deque(maxlen=math.ceil((self.config.buffer + self.config.lookahead + FOLLOW_SPAN) / self.period))
         self._judge_every = max(1, round(FOLLOW_EVERY / self.period))
         self._note("connection", f"{link.identity.model} {link.identity.serial}, software {link.identity.software}")
