@@ -83,7 +83,7 @@ CASES = {
     "protective stop": Case(one("protective-stop"), ("protective_stop",)),
     "emergency stop": Case(one("emergency-stop"), ("emergency_stop",)),
     "stall of 1 s": Case(one("stall", 1.0), ("silence", "client"), blind=1.1),
-    "foreign program": Case(one("foreign-program"), ("foreign_program",)),
+    "foreign program": Case(one("foreign-program"), ("foreign_program", "tracking")),
     "remote control off": Case(one("local-control"), ("remote_control",), profiles=("e",)),
     "client held": Case(one("hold-client"), ("client",), LIMIT_KILLED, when=ODD),
     "owner killed": Case(one("kill-owner"), limit=LIMIT_KILLED, owner="dead", when=ODD),
@@ -96,13 +96,13 @@ CASES = {
         (*one("protective-stop"), *one("dashboard-silent", 2.0)), ("protective_stop",), when=ODD
     ),
     "foreign program, dashboard silent": Case(
-        (*one("foreign-program"), *one("dashboard-silent", 2.0)), ("program", "arc", "follow"), when=ODD
+        (*one("foreign-program"), *one("dashboard-silent", 2.0)), ("program", "arc", "follow", "tracking"), when=ODD
     ),
     "protective stop, link dropped": Case(
         (*one("protective-stop"), *one("link-drop", 0.4)), ("protective_stop", "link"), blind=0.6, when=ODD
     ),
     "emergency stop after client killed": Case(
-        (*one("kill-client"), (0.03, "emergency-stop", 0)), ("client", "emergency_stop"), when=ODD
+        (*one("kill-client"), (0.03, "emergency-stop", 1.0)), ("client", "emergency_stop"), when=ODD
     ),
     "link dropped while connecting": Case(one("link-drop", 0.4), ("connection", "link", None), when=("connect",) * 3, blind=0.6),
     "protective stop while connecting": Case(
@@ -337,7 +337,7 @@ def log_troubles(case: Case, seen: dict[str, Any], rows: dict[str, np.ndarray], 
             wrong.append("a period twice in the log")
         if seen["last_arc"] or seen["last_speed"] > SEEN_AT_REST:
             wrong.append(f"log ends with arc {seen['last_arc']}, {seen['last_speed']:.3f} rad/s")
-        if seen["rule"] and seen["rule"] not in {kind for _, kind, _ in seen["events"]}:
+        if seen["rule"] and not any(seen["rule"] == kind or text in seen["text"] for _, kind, text in seen["events"]):
             wrong.append(f"no event tells of {seen['rule']}")
     box = seen.get("box")
     if seen["rule"] and seen["rule"] not in ("asked", "DEAD", "HANG") and seen.get("log"):

@@ -303,7 +303,7 @@ class SafetyGate(Robot):
         t = self._stamp if np.isfinite(self._stamp) else 0.0
         where = f"at {t:.3f} s, s = {1e3 * self._s:.1f} mm of the {self._segment.value}"
         message = f"{breach.rule}: {breach.text} {where}; the arc is off and the arm was stopped"
-        self._stop(message)
+        message += "".join(f"; {text}" for text in self._stop(message))
         if self.black_box is not None:
             message += f"; black box: {self.black_box}"
         raise ExecutionError(
@@ -318,9 +318,9 @@ class SafetyGate(Robot):
             black_box=self.black_box,
         )
 
-    def _stop(self, reason: str) -> None:
-        """The arc off first, then the arm at rest, then the black box; whatever fails of these is told and keeps none of the
-        others from being done."""
+    def _stop(self, reason: str) -> list[str]:
+        """What the robot found out about the cause: the arc off first, then the arm at rest, then the black box; whatever fails
+        of these is told and keeps none of the others from being done."""
         self._asked = False
         t = self._stamp if np.isfinite(self._stamp) else 0.0
         self._keep([Event(t=t, kind="stop", text=reason)])
@@ -329,8 +329,11 @@ class SafetyGate(Robot):
                 act()
             except Exception as error:  # of any kind: what is still to be done is done
                 self._keep([Event(t=t, kind="fault", text=f"{name}: {type(error).__name__}: {error}")])
+        causes: list[str] = []
         try:
-            self._keep(self.inner.events())
+            found = self.inner.events()
+            causes = [event.text for event in found if event.kind == "cause"]
+            self._keep(found)
             at_rest = self.inner.state()
             self._catch_up()
             self._see(at_rest, at_rest.q, np.zeros(6))
@@ -338,12 +341,13 @@ class SafetyGate(Robot):
             self._keep([Event(t=t, kind="fault", text=f"no report after the stop: {type(error).__name__}: {error}")])
         self._forget()
         if self._folder is None:
-            return
+            return causes
         try:
             self.black_box = self._box.write(self._folder, reason)
             self._keep([Event(t=t, kind="black box", text=f"written to {self.black_box}")])
         except WeldsimError as error:
             self._keep([Event(t=t, kind="fault", text=f"black box: {error}")])
+        return causes
 
     def _see(self, state: RobotState, q: Float[ndarray, "6"], qd: Float[ndarray, "6"]) -> None:
         """The newest report, into the black box; it is passed over where the caller sees a newer one only."""

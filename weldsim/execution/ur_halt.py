@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 from weldsim.execution.ur_config import UrConfig
 from weldsim.execution.ur_dashboard import Dashboard, switch_off
@@ -48,14 +49,13 @@ class Halt:
         try:
             with Dashboard(self._config.host, PATIENCE) as dashboard:
                 remote = dashboard.remote_control() if self._link.series == "e" else None
-                state, _, program = dashboard.ask("programState").partition(" ")
+                other = _other_program(dashboard)
         except LinkError:
             return trouble
         if remote is False:
             self.trouble = program_trouble(sample, remote) or trouble
-        elif state == "PLAYING" and program != PROGRAM:
-            text = f"another program runs on the controller ({program}); end it or let it end, connect again"
-            self.trouble = Trouble("foreign_program", text, program, PROGRAM)
+        else:
+            self.trouble = other or trouble
         return self.trouble
 
     def wait(self) -> Iterator[Sample]:
@@ -114,6 +114,8 @@ class Halt:
             return
         self._forced = True
         told = switch_off(self._config.host, self._config.arc_output, PATIENCE)
+        with suppress(LinkError), Dashboard(self._config.host, PATIENCE) as dashboard:
+            self.trouble = _other_program(dashboard) or self.trouble  # that is why the client hears nothing
         ended = self.trouble is not None and self.trouble.rule in NOT_OURS
         ended = ended or self._end_program()
         self.notes.append(
@@ -141,3 +143,12 @@ class Halt:
             self._link.stream = StateStream(self._config.host, PATIENCE)
         except LinkError:
             time.sleep(STEP)
+
+
+def _other_program(dashboard: Dashboard) -> Trouble | None:
+    """The trouble that a program is which is not ours, or None. Raises LinkError."""
+    state, _, program = dashboard.ask("programState").partition(" ")
+    if state != "PLAYING" or program == PROGRAM:
+        return None
+    text = f"another program runs on the controller ({program}); end it or let it end, connect again"
+    return Trouble("foreign_program", text, program, PROGRAM)

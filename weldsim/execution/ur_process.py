@@ -151,7 +151,10 @@ class ClientProcess:
                 self.refusal = Refusal("stall", gap)
 
     def close(self, seconds: float) -> bool:
-        """End it in order: arc off, rest, program on the controller ended; killed where it takes too long. Whether in order."""
+        """End it in order: arc off, rest, program on the controller ended; killed where it takes too long. Whether in order;
+        False where it had been killed."""
+        if self._ended:
+            return False
         number, orderly = self._count + 1, False
         end = time.monotonic() + seconds
         try:
@@ -196,7 +199,9 @@ class ClientProcess:
         return f"the client process {cause}{self._said()}"
 
     def _said(self) -> str:
-        """The last that the library printed."""
+        """The last that the library printed; nothing once `kill` has let go of it."""
+        if self._noise.closed:
+            return ""
         descriptor = self._noise.fileno()
         start = max(0, os.fstat(descriptor).st_size - 4 * TAIL)
         text = " ".join(os.pread(descriptor, 4 * TAIL, start).decode(errors="replace").split())  # its own offset stays

@@ -257,8 +257,9 @@ class UrRobot(Robot):
             self._take(sample)
         for text in halt.notes:
             self._note("stop", text)
-        if self._trouble is None:
+        if self._trouble is None and halt.trouble is not None:
             self._trouble = halt.trouble
+            self._note("cause", halt.trouble.text)
         self._sent.clear()
 
     def _read_all(self, link: Link) -> None:
