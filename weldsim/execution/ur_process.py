@@ -75,6 +75,7 @@ class ClientProcess:
 
     def wait_ready(self, seconds: float) -> None:
         """Until its clients can be used. Raises ClientError, saying why they cannot."""
+        self._must_live()
         self._channel.settimeout(0.05)
         end = time.monotonic() + seconds
         while not self._ready:
