@@ -125,7 +125,7 @@ class Watched:
         elif "rows" in asked:
             path, rows = Path(asked["rows"]), np.array(self.rows).reshape(-1, len(COLUMNS))
             part = path.with_suffix(".part.npz")
-            np.savez(part, **{name: rows[:, k] for k, name in enumerate(COLUMNS)})
+            np.savez(part, allow_pickle=False, **{name: rows[:, k] for k, name in enumerate(COLUMNS)})
             os.replace(part, path)
             log = [[t, text] for t, text in self.server.machine.log if not len(rows) or t >= rows[0, 0]]
             return {"struck": self.struck, "log": log, "lost": self.server.lost, "overruns": self.server.overruns}
@@ -167,7 +167,7 @@ def break_network(broken: Broken) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("--profile", choices=("cb3", "e"), required=True)
     parser.add_argument("--host", required=True)
     parser.add_argument("--scene", default="")

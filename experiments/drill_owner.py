@@ -23,7 +23,7 @@ from weldsim.execution.ur_robot import UrRobot
 from weldsim.records import ExecutionLog
 
 
-class Enough(Exception):
+class EnoughError(Exception):
     """The owner's own wish to stop."""
 
 
@@ -38,7 +38,7 @@ def weld_once(host: str, trajectory: Any, asked: dict[str, Any]) -> dict[str, An
 
     def progress(done: float) -> None:
         if stop_at is not None and done >= stop_at:
-            raise Enough
+            raise EnoughError
 
     try:
         gate.connect()
@@ -49,9 +49,10 @@ def weld_once(host: str, trajectory: Any, asked: dict[str, Any]) -> dict[str, An
         seen["step"] = "disconnect"
     except ExecutionError as error:
         seen |= {"rule": error.data.get("rule"), "text": str(error)}
-        if isinstance(error.data.get("log"), ExecutionLog):
-            seen |= told(error.data["log"])
-    except Enough:
+        found = error.data.get("log")
+        if isinstance(found, ExecutionLog):
+            seen |= told(found)
+    except EnoughError:
         seen |= {"rule": "asked", "text": "stopped on request"}
     except Exception as error:  # a defect: told, not hidden
         seen |= {"rule": "DEFECT", "text": f"{type(error).__name__}: {error}"}

@@ -111,6 +111,18 @@ ROWS = {
             ("e", "ur_rtde and a virtual e-Series controller"),
         )
     },
+    **{
+        f"drill_{key}": Row(
+            f"a short weld struck at random instants, both virtual controllers, {name}: until arc off / arm at rest, worst",
+            ("arc", "rest"),
+            "s",
+            (limit, limit),
+        )
+        for key, name, limit in (
+            ("faults", "link, protective and emergency stop, stall, foreign program, local control, two at once", 0.3),
+            ("killed", "client process, its owner or both killed or held", 0.5),
+        )
+    },
     "random_jobs": Row(
         "200 random jobs, some infeasible: moved before being refused, broke a limit, or wrongly judged",
         ("count",),

@@ -22,7 +22,6 @@ from weldsim.kinematics import JOINT_NAMES, torch_tip
 from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import Event, JointTrajectory, RobotFacts, RobotState, Segment
 
-
 PASSED = 4000  # states kept for `passed_over`: 8 s at 500 Hz
 
 

@@ -213,6 +213,7 @@ def test_the_log_of_the_simulated_arm_goes_down_to_rest(tmp_path: Path) -> None:
         with pytest.raises(ExecutionError, match="torch speed") as caught:
             execute(gate, move, ExecutionConfig(blend=0.01))
     log, box = caught.value.data["log"], read_black_box(str(gate.black_box))
+    assert isinstance(log, ExecutionLog)
     assert np.abs(log.qd_act).max() > 0.02
     for t, speed in ((log.t, log.qd_act), (box.t, box.qd_act)):
         np.testing.assert_allclose(np.diff(np.unique(t)), 0.008, rtol=1e-6)
@@ -225,7 +226,7 @@ def test_what_a_robot_finds_out_while_it_stops_is_told() -> None:
     gate.connect()
     gate.servo(START, np.zeros(6))
     robot.events = lambda: (Event(t=0.0, kind="cause", text="another program runs"),)  # type: ignore[method-assign]
-    with pytest.raises(ExecutionError, match="joint speed.*the arm was stopped; another program runs"):
+    with pytest.raises(ExecutionError, match=r"joint speed.*the arm was stopped; another program runs"):
         gate.servo(START + 1.0, np.zeros(6))
 
 
