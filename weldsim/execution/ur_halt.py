@@ -8,14 +8,13 @@ from weldsim.execution.ur_config import UrConfig
 from weldsim.execution.ur_dashboard import Dashboard, switch_off
 from weldsim.execution.ur_link import Link
 from weldsim.execution.ur_process import ClientError
-from weldsim.execution.ur_status import Trouble, at_rest, program_trouble
+from weldsim.execution.ur_status import Trouble, at_rest, foreign_trouble, program_trouble
 from weldsim.execution.ur_stream import LinkError, Sample, StateStream
 
 PATIENCE = 0.2  # [s] for a conversation that must not hold up a stop
 CLIENT_STOP = 0.5  # [s] that the client process may take to bring the arm to rest
 CLIENT_END = 1.0  # [s] that it may take to end
 STEP = 0.02  # [s]
-PROGRAM = "rtde_control"  # name of ur_rtde's program on the controller
 NOT_OURS = ("foreign_program", "remote_control", "emergency_stop")
 """Troubles after which there is no program of ours to end."""
 
@@ -49,7 +48,7 @@ class Halt:
         try:
             with Dashboard(self._config.host, PATIENCE) as dashboard:
                 remote = dashboard.remote_control() if self._link.series == "e" else None
-                other = _other_program(dashboard)
+                other = foreign_trouble(dashboard.ask("programState"))
         except LinkError:
             return trouble
         if remote is False:
@@ -115,7 +114,7 @@ class Halt:
         self._forced = True
         told = switch_off(self._config.host, self._config.arc_output, PATIENCE)
         with suppress(LinkError), Dashboard(self._config.host, PATIENCE) as dashboard:
-            self.trouble = _other_program(dashboard) or self.trouble  # that is why the client hears nothing
+            self.trouble = foreign_trouble(dashboard.ask("programState")) or self.trouble  # that is why the client hears nothing
         ended = self.trouble is not None and self.trouble.rule in NOT_OURS
         ended = ended or self._end_program()
         self.notes.append(
@@ -143,12 +142,3 @@ class Halt:
             self._link.stream = StateStream(self._config.host, PATIENCE)
         except LinkError:
             time.sleep(STEP)
-
-
-def _other_program(dashboard: Dashboard) -> Trouble | None:
-    """The trouble that a program is which is not ours, or None. Raises LinkError."""
-    state, _, program = dashboard.ask("programState").partition(" ")
-    if state != "PLAYING" or program == PROGRAM:
-        return None
-    text = f"another program runs on the controller ({program}); end it or let it end, connect again"
-    return Trouble("foreign_program", text, program, PROGRAM)

@@ -13,11 +13,12 @@ from weldsim.execution.ur_config import PERIODS, Series, UrConfig
 from weldsim.execution.ur_dashboard import Dashboard, Identity
 from weldsim.execution.ur_modes import RuntimeState
 from weldsim.execution.ur_process import ClientError, ClientProcess
-from weldsim.execution.ur_status import Trouble, safety_trouble
+from weldsim.execution.ur_status import LOCAL, Trouble, foreign_trouble, safety_trouble
 from weldsim.execution.ur_stream import LinkError, Sample, StateStream
 
 READY = 1  # output_int_register_0 while ur_rtde's script waits for a command
 ON_ITS_WAY = 3  # states that a network may hold
+PROOF = 0.1  # [s] in which a state comes where the controller lives
 READ_BACK = 1e-6  # [m], [rad], [kg] that a setting may differ by when read back
 
 
@@ -73,8 +74,9 @@ def open_link(config: UrConfig, name: str) -> Link:
                 raise refuse(trouble)
         return Link(series=series, period=PERIODS[series], identity=identity, arm=arm, stream=stream, client=client, first=first)
     except (LinkError, ClientError) as error:
+        trouble = _meanwhile(config, stream) or Trouble("connection", f"not connected: {error}")
         _abandon(stream, client)
-        raise refuse(Trouble("connection", f"not connected: {error}")) from None
+        raise refuse(trouble) from None
     except ExecutionError:
         _abandon(stream, client)
         raise
@@ -103,12 +105,7 @@ def _greet(config: UrConfig) -> Identity:
     with Dashboard(config.host, config.connect_timeout) as dashboard:
         identity = dashboard.identity()
         if identity.remote_control is False:
-            raise ExecutionError(
-                f"UR at {config.host}: remote control is off; switch the pendant to remote control, connect again",
-                rule="remote_control",
-                value=False,
-                limit=True,
-            )
+            raise LOCAL.error(f"UR at {config.host}", 0.0)
         if not dashboard.stop_program():
             raise LinkError("the dashboard does not obey; is the pendant in local control?")
     return identity
@@ -136,6 +133,20 @@ def _await(stream: StateStream, condition: Callable[[Sample], bool], seconds: fl
             if condition(sample):
                 return sample
     raise LinkError(f"the controller did not {goal} within {seconds:g} s")
+
+
+def _meanwhile(config: UrConfig, stream: StateStream | None) -> Trouble | None:
+    """What has come into the way of a connection that was being made: the library does not say. None where nothing is found."""
+    if stream is None:
+        return None
+    try:
+        samples = stream.take_all() if stream.wait(PROOF) else []
+        if samples and (trouble := safety_trouble(samples[-1])):
+            return trouble
+        with Dashboard(config.host, PROOF) as dashboard:
+            return LOCAL if dashboard.remote_control() is False else foreign_trouble(dashboard.ask("programState"))
+    except LinkError:
+        return None
 
 
 def _skip_old(stream: StateStream, seconds: float) -> None:

@@ -15,6 +15,7 @@ from weldsim.records import RobotFacts, RobotState
 
 PROTECTIVE_BIT, EMERGENCY_BITS = 1 << 2, 1 << 5 | 1 << 6 | 1 << 7
 MAY_MOVE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
+PROGRAM = "rtde_control"  # name of ur_rtde's program on the controller
 AT_REST = 0.01  # [rad/s] no joint faster: the arm rests
 
 
@@ -76,18 +77,25 @@ def safety_trouble(sample: Sample) -> Trouble | None:
     return None
 
 
+LOCAL = Trouble("remote_control", "remote control is off; switch the pendant to remote control, connect again", False, True)
+
+
+def foreign_trouble(program_state: str) -> Trouble | None:
+    """The trouble that a program runs which is not ours, or None. Args: program_state, the dashboard's answer of that name."""
+    state, _, program = program_state.partition(" ")
+    if state != "PLAYING" or program == PROGRAM:
+        return None
+    text = f"another program runs on the controller ({program}); end it or let it end, connect again"
+    return Trouble("foreign_program", text, program, PROGRAM)
+
+
 def program_trouble(sample: Sample, remote_control: bool | None) -> Trouble | None:
     """What has become of the program that takes our commands, or None while it runs. Args: remote_control, None if unknown."""
     if sample.runtime_state == RuntimeState.PLAYING:
         return None
     word = _name(RuntimeState, sample.runtime_state)
     if remote_control is False:
-        return Trouble(
-            "remote_control",
-            "remote control is off; switch the pendant to remote control, connect again",
-            False,
-            True,
-        )
+        return LOCAL
     return Trouble(
         "program",
         f"the control program is {word}, by somebody else or by its watchdog; connect again to start it",
