@@ -2,7 +2,7 @@
 
 FILE holds the joint trajectory. Each line {"run": {"boxes": FOLDER, "stop_at": T or null}} on standard input is one connection and
 one weld; T is the share of it after which the owner itself asks for a stop. Prints {"connected": PID} and, in the end, one JSON
-object: what was raised, how long each step took on the wall's clock, and the log.
+object: what was raised, how long each step took on the wall's clock, and the log. A line {"again": true} is a connection alone.
 """
 
 import json
@@ -76,6 +76,17 @@ def weld_once(host: str, trajectory: Any, asked: dict[str, Any]) -> dict[str, An
     return seen
 
 
+def connect_once(host: str) -> dict[str, Any]:
+    """One connection: the rule that refused it, or None."""
+    began = time.monotonic()
+    try:
+        with SafetyGate(UrRobot(UrConfig(host=host))) as gate:
+            gate.facts()
+    except ExecutionError as error:
+        return {"again": error.data.get("rule"), "text": str(error), "took": time.monotonic() - began}
+    return {"again": None, "text": "", "took": time.monotonic() - began}
+
+
 def told(log: ExecutionLog) -> dict[str, Any]:
     return {
         "log": log.t.tolist(),
@@ -92,7 +103,9 @@ def main(host: str, file: str) -> None:
     trajectory = pickle.loads(Path(file).read_bytes())  # written by the drill itself
     print(json.dumps({"owner": "ready"}), flush=True)
     for line in sys.stdin:
-        print(json.dumps({"ended": weld_once(host, trajectory, json.loads(line)["run"])}), flush=True)
+        asked = json.loads(line)
+        answer = {"ended": weld_once(host, trajectory, asked["run"])} if "run" in asked else connect_once(host)
+        print(json.dumps(answer), flush=True)
 
 
 if __name__ == "__main__":

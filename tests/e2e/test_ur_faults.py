@@ -22,7 +22,9 @@ from tests.torch_paths import START
 from tests.ur_robots import controlled, place, ur_robot
 from weldsim.controller.ask import ask
 from weldsim.errors import ExecutionError
+from weldsim.execution import ur_link
 from weldsim.execution.ur_config import Series
+from weldsim.execution.ur_process import ClientError, ClientProcess
 
 AT_REST = 0.02  # [rad/s]
 LIMIT, LIMIT_KILLED = 0.3, 0.5  # [s]
@@ -148,6 +150,33 @@ def test_a_fault_of_the_controller(controller: tuple[Series, str], fault: str) -
             seen = owner.ended()
     check_end(seen, RULE[fault])
     check_next(host)
+
+
+@pytest.mark.parametrize(("fault", "rule"), [*list(RULE.items())[:3], ("local-control", "remote_control")])
+def test_what_comes_in_the_way_of_a_connection_is_named(
+    controller: tuple[Series, str], fault: str, rule: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The client library knows only that its program does not take a setting, or does not start."""
+    series, host = controller
+    if (series, fault) == ("cb3", "local-control"):
+        rule = "connection"  # there is no such switch
+
+    class Unlucky(ClientProcess):
+        def __init__(self, settings: object, answer_timeout: float) -> None:
+            ask(host, {"fault": fault})
+
+        def wait_ready(self, seconds: float) -> None:
+            raise ClientError("the controller refused set_tcp")
+
+        def close(self, seconds: float) -> bool:
+            return True
+
+    monkeypatch.setattr(ur_link, "ClientProcess", Unlucky)
+    ask(host, {"fault": "recover"})
+    with pytest.raises(ExecutionError) as caught:
+        ur_robot(host).connect()
+    assert caught.value.data["rule"] == rule
+    ask(host, {"fault": "recover"})
 
 
 def test_local_control_ends_a_weld_on_e_series(controller: tuple[Series, str]) -> None:

@@ -286,7 +286,8 @@ class SafetyGate(Robot):
 
     def _give_up(self, error: ExecutionError) -> None:
         """Stop, write, and add to the inner robot's own error where that was."""
-        self._stop(str(error))
+        found = [text for text in self._stop(str(error)) if text not in str(error)]
+        error.args = ("; ".join([str(error), *found]), *error.args[1:])
         error.data.setdefault("s", self._s)
         error.data.setdefault("segment", self._segment.value)
         error.data["black_box"] = self.black_box
@@ -318,8 +319,8 @@ class SafetyGate(Robot):
         )
 
     def _stop(self, reason: str) -> list[str]:
-        """What the robot found out about the cause: the arc off first, then the arm at rest, then the black box; whatever fails
-        of these is told and keeps none of the others from being done."""
+        """What the robot found out about the cause, or could not see. The arc off first, then the arm at rest, then the black box;
+        whatever fails of these is told and keeps none of the others from being done."""
         self._asked = False
         t = self._stamp if np.isfinite(self._stamp) else 0.0
         self._keep([Event(t=t, kind="stop", text=reason)])
@@ -331,7 +332,7 @@ class SafetyGate(Robot):
         causes: list[str] = []
         try:
             found = self.inner.events()
-            causes = [event.text for event in found if event.kind == "cause"]
+            causes = [event.text for event in found if event.kind in ("cause", "unseen")]
             self._keep(found)
             at_rest = self.inner.state()
             self._catch_up()

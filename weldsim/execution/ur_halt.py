@@ -25,6 +25,7 @@ class Halt:
     Attributes:
         trouble: what makes the connection useless from now on, or None.
         notes: what was out of the ordinary, lines of text.
+        unseen: whether arc off and arm at rest were not seen in time.
     """
 
     def __init__(self, link: Link, config: UrConfig, trouble: Trouble | None, last: bool = False) -> None:
@@ -32,6 +33,7 @@ class Halt:
         self._link, self._config, self._last = link, config, last
         self.trouble = trouble
         self.notes: list[str] = []
+        self.unseen = False
         self._forced = False
         self._number: int | None = None
         try:
@@ -63,7 +65,9 @@ class Halt:
         calm = False
         while not (calm and self._client_done()):
             if time.monotonic() > end:
-                self.notes.append("arc and arm at rest could not be confirmed in time" if not calm else "the client did not answer")
+                self.unseen = not calm
+                if calm:
+                    self.notes.append("the client did not answer")
                 break
             if not calm and time.monotonic() - self._began > CLIENT_STOP:
                 self._force()

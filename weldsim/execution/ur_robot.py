@@ -41,6 +41,7 @@ GRACE = 0.02  # [s] for what came in while this process was held up
 TAKEN = 2000  # states kept for `passed_over`: 4 s at 500 Hz
 SILENT = 0.5  # [s] without a state after which `state` says that there is no link
 EVIDENCE = 0.1  # [s] in which the state says why a command was refused
+UNSEEN = "arc off and arm at rest were not seen: look at both"
 
 
 @final
@@ -257,6 +258,8 @@ class UrRobot(Robot):
             self._take(sample)
         for text in halt.notes:
             self._note("stop", text)
+        if halt.unseen:
+            self._note("unseen", UNSEEN)
         if self._trouble is None and halt.trouble is not None:
             self._trouble = halt.trouble
             self._note("cause", halt.trouble.text)

@@ -228,6 +228,13 @@ def test_what_a_robot_finds_out_while_it_stops_is_told() -> None:
     robot.events = lambda: (Event(t=0.0, kind="cause", text="another program runs"),)  # type: ignore[method-assign]
     with pytest.raises(ExecutionError, match=r"joint speed.*the arm was stopped; another program runs"):
         gate.servo(START + 1.0, np.zeros(6))
+    robot = OwnPace(0.008, fail_at=1)
+    gate = SafetyGate(robot)
+    gate.connect()
+    gate.servo(START, np.zeros(6))
+    robot.events = lambda: (Event(t=0.0, kind="unseen", text="rest was not seen"),)  # type: ignore[method-assign]
+    with pytest.raises(ExecutionError, match="protective stop; rest was not seen"):
+        gate.servo(START, np.zeros(6))
 
 
 def test_the_torch_tip_is_that_of_the_torch_pose() -> None:
