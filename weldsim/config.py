@@ -83,9 +83,11 @@ class CellConfig:
     """Limits of the verdict."""
 
 
-def limits_for(config: CellConfig, scene: "SceneConfig") -> ReportConfig:
+def limits_for(config: CellConfig, scene: "SceneConfig | None") -> ReportConfig:
     """The limits of the verdict on a scene: its own where it has some and the config leaves the general ones as they are."""
     general, report = ReportConfig(), config.report
+    if scene is None:
+        return report
     own = {name: value for name, value in vars(scene.limits).items() if value is not None and hasattr(report, name)}
     return replace(report, **{name: value for name, value in own.items() if getattr(report, name) == getattr(general, name)})
 

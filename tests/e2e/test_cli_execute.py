@@ -2,6 +2,7 @@
 
 import copy
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -145,6 +146,25 @@ def test_what_a_dry_run_refuses_is_not_begun(
         "path.json",
         "run.json",
     ]
+
+
+def test_a_refusal_names_the_dry_run_that_repeats_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = written(tmp_path, document(shift=(0.0, -1.2, 0.1)))
+    assert main(["execute", file, "--robot", "sim", "--scene", "plain", "--out", str(tmp_path / "out")]) == 1
+    line = next(line for line in capsys.readouterr().out.splitlines() if "weldsim dry-run" in line)
+    words = shlex.split(line.partition("fails; ")[2].removesuffix(" looks for a fix"))
+    assert words[:5] == ["weldsim", "dry-run", file, "--scene", "plain"]
+    assert main([*words[1:], "--no-fix"]) == 1
+    assert "unreachable" in capsys.readouterr().out
+
+
+def test_a_scenes_own_limits_are_those_of_the_json_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, file = tmp_path / "out", written(tmp_path, document(shift=(-0.015, -0.45, 0.022)))
+    own = ["--scene", "straight", "--set", "scene.limits.max=0.0077"]
+    main(["execute", file, "--robot", "sim", "--out", str(out), "--json", *own])
+    checks = json.loads(capsys.readouterr().out)["report"]["checks"]
+    assert "<= 7.7 mm" in [check["limit"] for check in checks]
+    assert checks == json.loads((out / "report.json").read_text())["checks"]
 
 
 def test_a_weld_leaves_log_and_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

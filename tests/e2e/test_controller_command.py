@@ -65,11 +65,28 @@ def test_addresses_that_cannot_be_had_are_refused(capsys: pytest.CaptureFixture[
         assert main(["controller", "--host", host]) == 2
         assert "holds a second controller" in capsys.readouterr().err
     assert main(["controller", "--host", "203.0.113.9"]) == 2  # nobody's
+    assert "second controller" not in capsys.readouterr().err
     assert main(["controller", "--host", "no such host"]) == 2
     assert main(["controller", "--speed", "0"]) == 2
     assert main(["controller", "status", "--host", free_address()]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 4, lines
+    assert len(lines) == 3, lines
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["fault"], "protective-stop, emergency-stop"),
+        (["fault", "protectve-stop"], "'protective-stop'"),
+        (["status", "stall"], "weldsim controller fault stall"),
+        (["fault", "none"], "invalid choice"),
+    ],
+)
+def test_a_fault_is_ordered_by_its_name(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["controller", *words]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert says in said
 
 
 def test_only_the_address_asked_for_is_served() -> None:

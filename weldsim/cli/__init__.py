@@ -37,8 +37,8 @@ def main(args: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         _drop_stdout()
         return NO_READER
-    except KeyboardInterrupt:
-        return _fail("interrupted", INTERRUPTED, as_json=False)
+    except KeyboardInterrupt as interrupt:
+        return _fail(str(interrupt) or "interrupted", INTERRUPTED, as_json=False)
     except WeldsimError as error:
         return _fail(str(error), error.exit_code, as_json="--json" in words)
     except (OSError, MemoryError) as error:

@@ -4,7 +4,7 @@ import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import tyro
 
@@ -25,7 +25,7 @@ class Controller(ConfigOptions):
     action: tyro.conf.Positional[Literal["serve", "fault", "status"]] = "serve"
     """Serve, order a fault, or ask for the state."""
 
-    fault: tyro.conf.Positional[Literal[FaultName, "none"]] = "none"
+    fault: tyro.conf.Positional[FaultName | None] = None
     """With fault: which. protective-stop, emergency-stop: arm stopped, program held or ended. stall: silent for --seconds while
     program and arm go on. link-drop: every client hung up on for --seconds. foreign-program: somebody else's program runs.
     local-control, remote-control: clients may only look, or act (e-Series). recover: program ended, stops lifted, brakes off."""
@@ -60,8 +60,10 @@ class Controller(ConfigOptions):
 
     def __call__(self) -> int:
         """0."""
-        if (self.action == "fault") != (self.fault != "none"):
-            raise InputError("controller: fault takes the name of a fault, and nothing else does; see weldsim controller --help")
+        if self.action == "fault" and self.fault is None:
+            raise InputError(f"controller fault: which? one of {', '.join(get_args(FaultName))}")
+        if self.action != "fault" and self.fault is not None:
+            raise InputError(f"controller {self.action} {self.fault}: weldsim controller fault {self.fault} is meant?")
         return self._serve() if self.action == "serve" else self._ask()
 
     def _serve(self) -> int:

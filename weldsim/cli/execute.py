@@ -1,5 +1,7 @@
 """`weldsim execute`."""
 
+import shlex
+import signal
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from weldsim.dryrun.cell import Cell
     from weldsim.dryrun.program import Program
     from weldsim.execution.robot import Robot
+    from weldsim.records import ExecutionLog
     from weldsim.welding.job import Job, JobConfig
 
 MARKS = {True: "ok", False: "FAIL", None: "-"}
@@ -80,6 +83,7 @@ class Execute(ConfigOptions):
         scene = None if self.scene is None else self.scene_of(self.scene)
         config = paced_for(config, scene)
         cell, known = self._cell(scene, config)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # stops the arm, as Ctrl-C does
         with progress() as tell:
             clock = Clock(tell)
             robot = self._robot(config, cell)
@@ -88,7 +92,7 @@ class Execute(ConfigOptions):
             write_job(folder, self.file, program, findings, cloud, done, job, config, cell.name, scene, known)
         written = [folder, *([done.black_box] if done.black_box is not None else [])]
         if self.json:
-            print_json({**job_document(done, program, job, config, cell.name), "written": [str(path) for path in written]})
+            print_json({**job_document(done, program, job, config, cell.name, scene), "written": [str(path) for path in written]})
         else:
             self._print(done, program, job, config, scene, written)
         return 0 if done.passed else 1
@@ -145,7 +149,7 @@ class Execute(ConfigOptions):
         rows = [[c.name, c.value, c.expected, MARKS[c.passed], c.advice if c.passed is False else ""] for c in done.clauses]
         print(table(rows, ("contract", "robot", "expected", "", "")))
         if done.trial is not None and not done.trial.passed:
-            print(f"  nothing has moved: a dry run from where the arm stands fails; `weldsim dry-run {self.file}` looks for a fix")
+            print(f"  nothing has moved: a dry run from where the arm stands fails; {self._dry_run(done)} looks for a fix")
             print(table(failures(done.trial), ("waypoint", "s", "verdict", "reason")))
         if done.stopped is not None:
             print(f"  {'stopped' if done.moved else 'nothing has moved'}: {done.stopped}")
@@ -153,17 +157,32 @@ class Execute(ConfigOptions):
             from weldsim.config import limits_for
             from weldsim.report.limits import checks
 
-            limits = config.report if scene is None else limits_for(config, scene)
-            rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in checks(done.report, limits)]
+            found = checks(done.report, limits_for(config, scene))
+            rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in found]
             print(table(rows, ("figure", "measured", "limit", "")))
             for reason in () if done.report.passed else done.report.reasons:
                 print(f"  {reason}")
-        if done.moved:
+        if done.log is not None:
             pace = "" if job.speed_scale == 1 else f" at {100 * job.speed_scale:g} % of the pace"
-            print(f"  arc {'on' if job.arc else 'off all along: no --arc'}; {done.log.t[-1] - done.log.t[0]:.1f} s{pace}")  # type: ignore[union-attr]
+            print(f"  arc {_arc(done.log, job)}; {done.log.t[-1] - done.log.t[0]:.1f} s{pace}")
         print(times(done.timing))
         for path in written:
             print(f"  wrote {path}")
+
+    def _dry_run(self, done: "Job") -> str:
+        """The command that repeats a job's dry run."""
+        scene = [] if self.scene is None else ["--scene", self.scene]
+        settings = [] if self.config is None else ["--config", str(self.config)]
+        settings += [word for text in self.set for word in ("--set", text)]
+        start = [] if done.q_start is None else ["--start", ", ".join(f"{angle:.4f}" for angle in done.q_start)]
+        return shlex.join(["weldsim", "dry-run", str(self.file), *scene, *settings, *start])
+
+
+def _arc(log: "ExecutionLog", job: "JobConfig") -> str:
+    """What became of the arc, in words."""
+    if not job.arc:
+        return "off all along: no --arc"
+    return "on" if log.arc_on.any() else "permitted, never on"
 
 
 def _word(done: "Job") -> str:

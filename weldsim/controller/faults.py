@@ -27,7 +27,7 @@ def inject(server: "Server", name: str, seconds: float = 1.0) -> str:
     if name not in get_args(FaultName):
         raise InputError(f"fault {name!r}: one of {', '.join(get_args(FaultName))}", name=name)
     if not 0 < seconds <= MAX_SECONDS:
-        raise InputError(f"fault {name}: {seconds:g} s, expected up to {MAX_SECONDS:g} s", value=seconds, limit=MAX_SECONDS)
+        raise InputError(f"fault {name}: {seconds:g} s, expected over 0, up to {MAX_SECONDS:g} s", value=seconds, limit=MAX_SECONDS)
     match name:
         case "protective-stop":
             machine.protective_stop("ordered")

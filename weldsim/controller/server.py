@@ -4,6 +4,7 @@ A control period begins at an absolute deadline, so lateness never adds up; what
 comes and counts from the next period on.
 """
 
+import errno
 import gc
 import selectors
 import socket
@@ -60,8 +61,10 @@ class Server:
         except OSError as error:
             self.close()
             reason = str(error.strerror or error).partition(" (")[0]
+            taken = error.errno == errno.EADDRINUSE
+            hint = "another address, 127.0.0.2 say, holds a second controller" if taken else "give an address of this machine"
             raise InputError(
-                f"controller: {self.host} port {port}: {reason}; another address, 127.0.0.2 say, holds a second controller",
+                f"controller: {self.host} port {port}: {reason}; {hint}",
                 host=self.host,
                 port=port,
             ) from None

@@ -52,7 +52,8 @@ def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[
     parts.append("</section>")
     if png is not None:
         image = base64.b64encode(png).decode()
-        parts.append(f'<section><h2>First failure</h2><img style="max-width:100%" src="data:image/png;base64,{image}"></section>')
+        title = "First failure" if failure is not None else "Halfway"
+        parts.append(f'<section><h2>{title}</h2><img style="max-width:100%" src="data:image/png;base64,{image}"></section>')
     parts.append(f"<section><h2>Waypoints</h2>{_waypoints(trial)}</section>")
     if len(trial.q) > 1:
         plots = [("Joint angles", trial.t, np.rad2deg(trial.q), "joint angle [deg]", np.rad2deg(JOINT_LIMIT))]

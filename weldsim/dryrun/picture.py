@@ -24,7 +24,7 @@ NEAR = 1.15  # [m] from the camera to the place
 
 
 def picture(trial: Trial, cell: Cell) -> bytes:
-    """A PNG of the first failure, or of the end of the weld where there is none.
+    """A PNG of the first failure, or of halfway through the motion where there is none.
 
     Raises:
         SensorError: nothing draws here.

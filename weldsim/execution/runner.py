@@ -95,6 +95,7 @@ def execute(
     Raises:
         ExecutionError: the robot has no gate, the arm does not stand where the trajectory starts, a command breaks a rule,
             or the robot stopped; `data`: rule, value, limit, t, and `log` with what was done until then.
+        KeyboardInterrupt: somebody interrupted; the arm was stopped first, and the message says where the black box is.
     """
     if not isinstance(robot, SafetyGate):
         raise ExecutionError("no robot is moved without its safety gate: execute(SafetyGate(robot), ...)", rule="gate")
@@ -122,6 +123,10 @@ def execute(
         recorder.end()
         error.data["log"] = recorder.log()
         raise
+    except KeyboardInterrupt as interrupt:
+        robot.stop()
+        box = "" if robot.black_box is None else f"; black box: {robot.black_box}"
+        raise KeyboardInterrupt(f"interrupted: the arc is off and the arm was stopped{box}") from interrupt
     except BaseException:
         robot.stop()
         raise

@@ -19,8 +19,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.execution.primary_packet import ROBOT_STATE, KinematicsInfo, MessageReader, PrimaryError, kinematics_in
+from weldsim.execution.rtde_talk import LinkError
 from weldsim.execution.ur_ports import PRIMARY, PRIMARY_READ_ONLY
-from weldsim.execution.ur_stream import LinkError
 
 PATIENCE = 0.5  # [s] in all: the first of ten states a second is due after 0.1
 RECEIVE_SIZE = 65536

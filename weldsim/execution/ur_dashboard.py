@@ -5,8 +5,8 @@ import socket
 from contextlib import suppress
 from dataclasses import dataclass
 
+from weldsim.execution.rtde_talk import LinkError
 from weldsim.execution.ur_ports import DASHBOARD, SECONDARY
-from weldsim.execution.ur_stream import LinkError
 
 LOCAL = "not allowed due to safety reasons"  # what an e-Series in local control answers
 MAX_LINE = 4096

@@ -4,12 +4,13 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 
+from weldsim.execution.rtde_talk import LinkError
 from weldsim.execution.ur_config import UrConfig
 from weldsim.execution.ur_dashboard import Dashboard, switch_off
 from weldsim.execution.ur_link import Link
 from weldsim.execution.ur_process import ClientError
 from weldsim.execution.ur_status import Trouble, at_rest, foreign_trouble, program_trouble
-from weldsim.execution.ur_stream import LinkError, Sample, StateStream
+from weldsim.execution.ur_stream import Sample, StateStream
 
 PATIENCE = 0.2  # [s] for a conversation that must not hold up a stop
 CLIENT_STOP = 0.5  # [s] that the client process may take to bring the arm to rest

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from weldsim.errors import ExecutionError
+from weldsim.execution.rtde_talk import LinkError, commanded_by_another
 from weldsim.execution.ur_arm import ArmTold, tell_arm
 from weldsim.execution.ur_client import ClientSettings
 from weldsim.execution.ur_config import PERIODS, Series, UrConfig
@@ -14,9 +15,10 @@ from weldsim.execution.ur_dashboard import Dashboard, Identity
 from weldsim.execution.ur_modes import RuntimeState
 from weldsim.execution.ur_process import ClientError, ClientProcess
 from weldsim.execution.ur_status import LOCAL, Trouble, foreign_trouble, safety_trouble
-from weldsim.execution.ur_stream import LinkError, Sample, StateStream
+from weldsim.execution.ur_stream import Sample, StateStream
 
 READY = 1  # output_int_register_0 while ur_rtde's script waits for a command
+HANDED_BACK = 1.0  # [s] in which a client that has just gone must have given back what it commanded by
 ON_ITS_WAY = 3  # states that a network may hold
 PROOF = 0.1  # [s] in which a state comes where the controller lives
 READ_BACK = 1e-6  # [m], [rad], [kg] that a setting may differ by when read back
@@ -43,16 +45,16 @@ class Link:
 def open_link(config: UrConfig, name: str) -> Link:
     """A connection whose control program runs and waits, arc off, TCP and payload as configured.
 
-    Whatever program ran before is stopped: with one running, and a ready flag left behind by an earlier client, the client library
-    waits for minutes.
+    A controller that another client commands is left to it. Whatever program runs otherwise is stopped: with one running, and a
+    ready flag left behind by an earlier client, the client library waits for minutes.
 
     Raises:
-        ExecutionError: nobody answers, remote control is off, the arm is stopped, a setting is not taken; `data`: rule, value,
-            limit.
+        ExecutionError: nobody answers, remote control is off, another client commands, the arm is stopped, a setting is not
+            taken; `data`: rule, value, limit.
     """
 
     def refuse(trouble: Trouble) -> ExecutionError:
-        return trouble.error(name, 0.0)
+        return trouble.error(name)
 
     stream: StateStream | None = None
     client: ClientProcess | None = None
@@ -74,7 +76,8 @@ def open_link(config: UrConfig, name: str) -> Link:
                 raise refuse(trouble)
         return Link(series=series, period=PERIODS[series], identity=identity, arm=arm, stream=stream, client=client, first=first)
     except (LinkError, ClientError) as error:
-        trouble = _meanwhile(config, stream) or Trouble("connection", f"not connected: {error}")
+        hint = "" if isinstance(error, ClientError) else "; is it switched on, and is that its address (--host, ur.host)?"
+        trouble = _meanwhile(config, stream) or Trouble("connection", f"not connected: {error}{hint}")
         _abandon(stream, client)
         raise refuse(trouble) from None
     except ExecutionError:
@@ -105,10 +108,24 @@ def _greet(config: UrConfig) -> Identity:
     with Dashboard(config.host, config.connect_timeout) as dashboard:
         identity = dashboard.identity()
         if identity.remote_control is False:
-            raise LOCAL.error(f"UR at {config.host}", 0.0)
+            raise LOCAL.error(f"UR at {config.host}")
+        _leave_to_another(config)
         if not dashboard.stop_program():
             raise LinkError("the dashboard does not obey; is the pendant in local control?")
     return identity
+
+
+def _leave_to_another(config: UrConfig) -> None:
+    """Nothing, where no other client commands: stopping its program would stop its weld. Raises LinkError, ExecutionError."""
+    end = time.monotonic() + HANDED_BACK
+    while commanded_by_another(config.host, config.connect_timeout):
+        if time.monotonic() > end:
+            raise ExecutionError(
+                f"UR at {config.host}: another client commands it, a second weldsim or a fieldbus adapter say; end that, connect"
+                " again",
+                rule="other_client",
+            )
+        time.sleep(0.1)
 
 
 def _series(config: UrConfig, stream: StateStream) -> Series:

@@ -17,6 +17,7 @@ from numpy import ndarray
 
 from weldsim.errors import ExecutionError
 from weldsim.execution.robot import Robot
+from weldsim.execution.rtde_talk import LinkError
 from weldsim.execution.ur_config import PERIODS, UrConfig
 from weldsim.execution.ur_dashboard import Dashboard
 from weldsim.execution.ur_halt import Halt
@@ -31,7 +32,7 @@ from weldsim.execution.ur_status import (
     robot_state,
     safety_trouble,
 )
-from weldsim.execution.ur_stream import LinkError, Sample
+from weldsim.execution.ur_stream import Sample
 from weldsim.records import Event, RobotFacts, RobotState
 
 FOLLOW_SPAN = 0.15  # [s] beyond the look-ahead in which the controller's target must have passed one of our commands

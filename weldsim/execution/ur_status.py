@@ -33,10 +33,11 @@ class Trouble:
     value: object = None
     limit: object = None
 
-    def error(self, name: str, t: float) -> ExecutionError:
-        """The same as an error. Args: name of the robot; t [s] of its clock."""
+    def error(self, name: str, t: float | None = None) -> ExecutionError:
+        """The same as an error. Args: name of the robot; t [s] of its clock, None before it is connected."""
+        when = "" if t is None else f" (t = {t:.3f} s)"
         return ExecutionError(
-            f"{name}: {self.text} (t = {t:.3f} s)", rule=self.rule, value=self.value, limit=self.limit, t=t, robot=name
+            f"{name}: {self.text}{when}", rule=self.rule, value=self.value, limit=self.limit, t=t or 0.0, robot=name
         )
 
 

@@ -5,22 +5,16 @@ only, so a reader that is late loses some, and its constructor waits for ever, h
 accepts and says nothing.
 """
 
-import socket
 import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from weldsim.errors import InputError, WeldsimError
-from weldsim.execution.rtde_packet import Packet, PacketReader, PacketType, layout, width
-from weldsim.execution.ur_ports import RTDE
+from weldsim.execution.rtde_packet import Packet, PacketType, layout, width
+from weldsim.execution.rtde_talk import RECEIVE_SIZE, LinkError, RtdeTalk
 
-RECEIVE_SIZE = 65536
-PROTOCOL = 2
 READ_TIMEOUT = 0.5  # [s]
 KEPT = 2000  # samples that nobody has taken: 4 s at 500 Hz
 NEEDED: dict[str, str] = {
@@ -43,10 +37,6 @@ WELCOME: dict[str, str] = {
     "actual_current_as_torque": "VECTOR6D",  # 5.23
 }
 """Variables that older controllers do not have."""
-
-
-class LinkError(WeldsimError):
-    """The connection is gone, or was refused. `data`: none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,80 +80,49 @@ class StateStream:
     def __init__(self, host: str, timeout: float) -> None:
         """Connects, and asks for every control period; raises LinkError where that takes longer than `timeout` [s]."""
         self._waiting: deque[Sample] = deque(maxlen=KEPT)
-        self._reader = PacketReader()
         self._loss, self._closing = "", False
         self._news = threading.Condition()
-        end = time.monotonic() + timeout
+        self._talk = RtdeTalk(host, timeout)
         try:
-            self._socket = socket.create_connection((host, RTDE), timeout)
-        except OSError as error:
-            raise LinkError(f"{host} port {RTDE}: {error.strerror or error}") from None
-        try:
-            self._set_up(end)
+            self._set_up()
         except LinkError:
-            self._socket.close()
+            self._talk.close()
             raise
         # Always read: a controller hangs up on who does not keep up, and the newest state must not lie behind old ones.
         self._thread = threading.Thread(target=self._read, name=f"RTDE {host}", daemon=True)
         self._thread.start()
 
-    def _set_up(self, end: float) -> None:
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if not self._ask(PacketType.PROTOCOL_VERSION, struct.pack(">H", PROTOCOL), end)[:1] == b"\x01":
-            raise LinkError("the controller does not speak version 2 of RTDE: software 3.4 or newer is needed")
-        self.version = struct.unpack_from(">4I", self._ask(PacketType.CONTROLLER_VERSION, b"", end).ljust(16, b"\0"))
+    def _set_up(self) -> None:
+        self.version = struct.unpack_from(">4I", self._talk.ask(PacketType.CONTROLLER_VERSION, b"").ljust(16, b"\0"))
         self.frequency = 125.0 if self.version[0] <= 3 else 500.0
         names = {**NEEDED, **WELCOME}
-        recipe, found = self._request(names, end)
+        recipe, found = self._request(names)
         if lacking := [name for name, kind in NEEDED.items() if found.get(name) != kind]:
             raise LinkError(f"the controller does not report {', '.join(lacking)}; its software is too old")
         if found != names:
             names = {name: kind for name, kind in names.items() if found.get(name) == kind}
-            recipe, _ = self._request(names, end)
+            recipe, _ = self._request(names)
         self._recipe = recipe
         self._names = tuple((name, width(kind)) for name, kind in names.items())
         self._layout = layout(tuple(names.values()))
-        if self._ask(PacketType.START, b"", end)[:1] != b"\x01":
+        if self._talk.ask(PacketType.START, b"")[:1] != b"\x01":
             raise LinkError("the controller does not start its stream of states")
-        self._socket.settimeout(READ_TIMEOUT)
+        self._talk.socket.settimeout(READ_TIMEOUT)
 
-    def _request(self, names: dict[str, str], end: float) -> tuple[int, dict[str, str]]:
+    def _request(self, names: dict[str, str]) -> tuple[int, dict[str, str]]:
         """Number of the recipe that would report these, and the type that the controller gives each."""
         wanted = struct.pack(">d", self.frequency) + ",".join(names).encode()
-        answer = self._ask(PacketType.SETUP_OUTPUTS, wanted, end)
+        answer = self._talk.ask(PacketType.SETUP_OUTPUTS, wanted)
         return answer[0], dict(zip(names, answer[1:].decode(errors="replace").split(","), strict=False))
-
-    def _ask(self, kind: PacketType, payload: bytes, end: float) -> bytes:
-        """The answer to a request of the same type. Raises LinkError."""
-        try:
-            self._socket.settimeout(max(0.01, end - time.monotonic()))
-            self._socket.sendall(Packet(kind, payload).encode())
-            while time.monotonic() < end:
-                for packet in self._packets(self._socket.recv(RECEIVE_SIZE)):
-                    if packet.type == kind:
-                        return packet.payload
-        except TimeoutError:
-            pass
-        except OSError as error:
-            raise LinkError(f"RTDE connection: {error.strerror or error}") from None
-        raise LinkError(f"the controller's RTDE port accepts, but does not answer ({kind.name.lower()})")
-
-    def _packets(self, data: bytes) -> Iterator[Packet]:
-        if not data:
-            raise LinkError("the controller hung up")
-        try:
-            yield from self._reader.feed(data)
-        except InputError as error:
-            raise LinkError(str(error)) from None
 
     def _read(self) -> None:
         """Take what comes in, until the connection ends; the thread's body."""
         loss = ""
         while not loss:
             try:
-                data = self._socket.recv(RECEIVE_SIZE)
+                data = self._talk.socket.recv(RECEIVE_SIZE)
                 arrived = time.monotonic()
-                samples = [self._sample(packet, arrived) for packet in self._packets(data) if self._is_state(packet)]
+                samples = [self._sample(packet, arrived) for packet in self._talk.packets(data) if self._is_state(packet)]
             except TimeoutError:
                 loss = "" if not self._closing else "closed"
                 continue
@@ -217,7 +176,6 @@ class StateStream:
     def close(self) -> None:
         """Hang up; harmless when that has happened."""
         self._closing = True
-        with suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)  # wakes the reading thread
+        self._talk.hang_up()  # wakes the reading thread
         self._thread.join(READ_TIMEOUT * 2)
-        self._socket.close()
+        self._talk.close()

@@ -51,7 +51,7 @@ def write_job(
             dry = DryRun(source=program.source, cell=cell, trials=(done.trial,), fixes=((),), notes=program.notes)
             write_json(place / "dry_run.json", dry_run_json(dry))
         if done.log is not None and done.report is not None:
-            limits = config.report if scene is None else limits_for(config, scene)
+            limits = limits_for(config, scene)
             write_whole(place / "log.npz", log_bytes(done.log))
             write_json(place / "report.json", report_json(done.report, limits))
             paths = tuple(done.path if i == job.seam else each for i, each in enumerate(program.paths))
@@ -96,8 +96,10 @@ def contract_json(clauses: tuple[Clause, ...], facts: RobotFacts | None) -> dict
     }
 
 
-def job_document(done: Job, program: Program, job: JobConfig, config: CellConfig, cell: str) -> dict[str, Any]:
-    """What became of a job, as JSON values."""
+def job_document(
+    done: Job, program: Program, job: JobConfig, config: CellConfig, cell: str, scene: "SceneConfig | None" = None
+) -> dict[str, Any]:
+    """What became of a job, as JSON values; `scene` may have limits of its own."""
     dry = None
     if done.trial is not None:
         dry = dry_run_json(DryRun(source=program.source, cell=cell, trials=(done.trial,), fixes=((),), notes=program.notes))
@@ -116,6 +118,6 @@ def job_document(done: Job, program: Program, job: JobConfig, config: CellConfig
         "black_box": None if done.black_box is None else str(done.black_box),
         "contract": contract_json(done.clauses, done.facts),
         "dry_run": dry,
-        "report": None if done.report is None else report_json(done.report, config.report),
+        "report": None if done.report is None else report_json(done.report, limits_for(config, scene)),
         "timing": {stage: round(seconds, 4) for stage, seconds in done.timing.items()},
     }

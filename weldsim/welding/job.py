@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from weldsim.clock import Clock
 from weldsim.config import CellConfig, digest, limits_for
@@ -39,7 +41,7 @@ class JobConfig:
 
     def __post_init__(self) -> None:
         if not LEAST_SCALE <= self.speed_scale <= 1.0:
-            raise InputError(f"--speed-scale {self.speed_scale:g}: over 0, {LEAST_SCALE:g} at least, and at most 1 is possible")
+            raise InputError(f"--speed-scale {self.speed_scale:g} is outside {LEAST_SCALE:g} to 1")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,7 +50,7 @@ class Job:
 
     Attributes:
         robot: its name.  facts, clauses: what the robot said of itself, and the contract line by line.
-        trial: the dry run from where the robot stood, None where the contract was broken.
+        q_start: where the robot stood [rad], and trial: the dry run from there; None where the contract was broken.
         log: what the arm did, None where it was not moved.  report: its figures.
         stopped: why the robot was refused or stopped, or None.  black_box: where it was written, or None.
         path: as it was welded.  timing: seconds a stage.
@@ -57,6 +59,7 @@ class Job:
     robot: str
     facts: RobotFacts | None
     clauses: tuple[Clause, ...]
+    q_start: Float[ndarray, "6"] | None
     trial: Trial | None
     log: ExecutionLog | None
     report: WeldReport | None
@@ -109,7 +112,7 @@ def weld(
     path = program.paths[job.seam]
     facts: RobotFacts | None = None
     clauses: tuple[Clause, ...] = ()
-    trial, log, stopped = None, None, None
+    q_start, trial, log, stopped = None, None, None, None
     gate = SafetyGate(robot, config.execution.gate, arc=job.arc, folder=job.black_boxes)
     with clock.stage("connect"):
         gate.connect()
@@ -119,7 +122,8 @@ def weld(
             clauses = contract(facts, gate.state(), config.execution.contract)
             require_kept(clauses, gate.name)
         with clock.stage("dry run"):
-            here = replace(cell, q_start=np.array(gate.state().q))
+            q_start = np.array(gate.state().q)
+            here = replace(cell, q_start=q_start)
             trial = try_path(path, program.names[job.seam], here, replace(config.motion, period=gate.period))
         if trial.passed and trial.trajectory is not None:
             trajectory = at_period(slowed(trial.trajectory, job.speed_scale), gate.period)
@@ -141,6 +145,7 @@ def weld(
         robot=gate.name,
         facts=facts,
         clauses=clauses,
+        q_start=q_start,
         trial=trial,
         log=log,
         report=report,
@@ -180,7 +185,7 @@ def job_report(
         welded=job.seam,
         trims=(config.path.start_trim, config.path.end_trim),
         config_digest=digest(config),
-        config=config.report if scene is None else limits_for(config, scene),
+        config=limits_for(config, scene),
     )
     if stopped is None:
         return report

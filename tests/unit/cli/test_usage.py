@@ -125,6 +125,7 @@ class Failing:
     [
         (WeldsimError("two\nlines"), 2, "two lines"),
         (KeyboardInterrupt(), 130, "interrupted"),
+        (KeyboardInterrupt("interrupted: the arm was stopped"), 130, "interrupted: the arm was stopped"),
         (ValueError("odd\nvalue"), 70, "defect of weldsim"),
         (OSError(28, "No space left on device", "x.json"), 2, "x.json: No space left"),
         (MemoryError(), 2, "out of memory"),

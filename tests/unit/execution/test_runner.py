@@ -141,7 +141,7 @@ def test_an_interrupt_stops_the_arm(trajectory: JointTrajectory) -> None:
         if done > 0.5:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt, match="arm was stopped"):
         execute(gated(robot), trajectory, None, interrupt)
     assert robot.stopped
     assert not robot.arc

@@ -24,9 +24,9 @@ from weldsim.execution.primary_packet import (
     framed,
     kinematics_in,
 )
+from weldsim.execution.rtde_talk import LinkError
 from weldsim.execution.ur_arm import PATIENCE, read_arm, tell_arm
 from weldsim.execution.ur_ports import PRIMARY, PRIMARY_READ_ONLY
-from weldsim.execution.ur_stream import LinkError
 from weldsim.kinematics import DH
 
 INFO = KinematicsInfo(DH + np.arange(24).reshape(6, 4) * 1e-4, 2, (1, 2, 3, 4, 5, 0xFFFFFFFF))
