@@ -4,7 +4,7 @@ Modified Denavit-Hartenberg (thesis eq 3.3, table 3.1); all inverse branches fro
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from weldsim.errors import UnreachableError
@@ -89,10 +89,16 @@ def torch_tip(q: Float[ndarray, "*batch 6"], X_FT: Transform = X_FT) -> Float[nd
 
 def inverse(X_BF: Transform) -> Float[ndarray, "k 6"]:
     """All joint solutions [rad] in (-pi, pi] of one flange pose; k is 0 (none) to 8."""
+    return inverse_of_many(X_BF.matrix[None])[0]
+
+
+def inverse_of_many(X_BF: Float[ndarray, "n 4 4"]) -> tuple[Float[ndarray, "n_k 6"], Int[ndarray, "n_k"]]:
+    """All joint solutions [rad] in (-pi, pi] of many flange poses, and the pose that each is of."""
     import ur_analytic_ik
 
-    solutions = ur_analytic_ik.ur5.inverse_kinematics(X_BF.matrix)  # pyright: ignore[reportAttributeAccessIssue] - compiled, untyped
-    return np.array([np.asarray(solution, float).reshape(6) for solution in solutions]).reshape(-1, 6)
+    solve = ur_analytic_ik.ur5.inverse_kinematics  # pyright: ignore[reportAttributeAccessIssue] - compiled, untyped
+    found = [(solution, i) for i, matrix in enumerate(X_BF) for solution in solve(matrix)]
+    return np.array([q for q, _ in found], float).reshape(-1, 6), np.array([i for _, i in found], np.int64)
 
 
 def inverse_near(X_BF: Transform, q_near: Float[ndarray, "6"]) -> Float[ndarray, "6"]:

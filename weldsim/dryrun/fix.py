@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
@@ -14,9 +15,11 @@ from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import Fix, Trial
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
+from weldsim.kinematics import inverse
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.cut import cut_path
 from weldsim.motion.rungs import turned
+from weldsim.mounts import X_FT
 from weldsim.records import Segment, TorchPath
 
 TURNS = np.deg2rad([s * a for a in (5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 105, 120, 135, 150, 165, 180) for s in (1, -1)])
@@ -28,6 +31,9 @@ HEADINGS = 12  # directions on the table
 CLOSE = 0.005  # [m] to which the nearest place that does is found
 TABLE = np.array([[-0.60, -0.84], [0.60, 0.20]])  # [m] the table top in B
 FULL_TRIES = 4  # whole checks of changes that passed the coarse look
+CANDIDATES = 3  # ways to hold the arm in such a check: what passes with the best of them passes
+FARTHER = (0.0, 0.02)  # [m] by which a part is moved further than the coarse look asks for
+MOVE_TRIES, OUTWARDS = 6, 1.5  # whole checks of places; by so much further away is the next, where one fails
 
 Progress = Callable[[float], None]
 
@@ -37,10 +43,14 @@ def fixes_for_path(
 ) -> tuple[Fix, ...]:
     """What would help a path that failed: a slower weld, a turn about the wire, a place for the part, cuts; all verified."""
     failure = trial.failure
-    if failure is None or failure.why in ("stale start", "orientation jump"):
+    if failure is None or failure.why == "orientation jump":
         return ()
+    if failure.why == "stale start":
+        config = replace(config, candidates=min(config.candidates, CANDIDATES))
+        return tuple(_move(path, trial, cell, config, tell)) if failure.first and cell.has_part else ()
     if failure.why == "speed":
         return _slower(path, trial, cell, config)
+    config = replace(config, candidates=min(config.candidates, CANDIDATES))
     found = _lead(path, trial, cell, config) if trial.lead else []
     if not path.roll_free:
         found += _turn(path, trial, cell, config)
@@ -90,7 +100,7 @@ def _turn(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
     tries = 0
     for turn in TURNS:
         changed = _with(path, X_BT=turned_about_wire(path.X_BT, float(turn)))
-        if not _quick(changed, cell, config):
+        if not _quick(changed, trial, cell, config):
             continue
         if try_path(changed, trial.name, cell, config).passed:
             text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg all along"
@@ -134,7 +144,7 @@ def _lean(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
     for angle in LEANS:
         for lean in ((angle, 0.0), (-angle, 0.0), (0.0, angle), (0.0, -angle)):
             changed = _with(path, X_BT=leaned(path.X_BT, *lean))
-            if not _quick(changed, cell, config):
+            if not _quick(changed, trial, cell, config):
                 continue
             if try_path(changed, trial.name, cell, config).passed:
                 which = "work" if lean[0] else "travel"
@@ -153,17 +163,19 @@ def leaned(X_BT: Transform, work: float, travel: float) -> Transform:
 
 
 def _move(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell: Progress) -> list[Fix]:
-    tries = 0
+    tries, least = 0, 0.0
     for k, move in enumerate(candidates(path.X_BT.p)):
         tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
-        if not _quick(_with(path, X_BT=shifted(path.X_BT, move)), cell.moved(move), config):
+        if np.linalg.norm(move) < least or not _quick(_with(path, X_BT=shifted(path.X_BT, move)), trial, cell.moved(move), config):
             continue
-        move = _nearest(path, move, cell, config)
-        for scale in (1.0, 1.0 + 0.01 / float(np.linalg.norm(move)), 1.0 + 0.03 / float(np.linalg.norm(move))):
-            if passes(path, scale * move, trial.name, cell, config):
-                return [moved_fix(scale * move)]
-        if (tries := tries + 1) >= FULL_TRIES:
-            break
+        move = _nearest(path, trial, move, cell, config)
+        for further in FARTHER:
+            longer = move * (1.0 + further / float(np.linalg.norm(move)))
+            if passes(path, longer, trial.name, cell, config):
+                return [moved_fix(longer)]
+            if (tries := tries + 1) >= MOVE_TRIES:
+                return []
+            least = OUTWARDS * float(np.linalg.norm(longer))
     return []
 
 
@@ -197,7 +209,7 @@ def _over_table(points: Float[ndarray, "n 2"]) -> bool:
     return bool((points >= TABLE[0]).all() and (points <= TABLE[1]).all())
 
 
-def _nearest(path: TorchPath, move: Float[ndarray, "3"], cell: Cell, config: MotionConfig) -> Float[ndarray, "3"]:
+def _nearest(path: TorchPath, trial: Trial, move: Float[ndarray, "3"], cell: Cell, config: MotionConfig) -> Float[ndarray, "3"]:
     """The shortest move in the same direction that the coarse look finds good, to CLOSE."""
     length = float(np.linalg.norm(move))
     low = max((d for d in DISTANCES if d < length - 1e-9), default=0.0)
@@ -205,7 +217,7 @@ def _nearest(path: TorchPath, move: Float[ndarray, "3"], cell: Cell, config: Mot
     while high - low > CLOSE:
         middle = (low + high) / 2
         trying = move * middle / length
-        good = _quick(_with(path, X_BT=shifted(path.X_BT, trying)), cell.moved(trying), config)
+        good = _quick(_with(path, X_BT=shifted(path.X_BT, trying)), trial, cell.moved(trying), config)
         low, high = (low, middle) if good else (middle, high)
     return move * high / length
 
@@ -227,19 +239,33 @@ def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress 
     failure = trial.failure
     if failure is None or failure.why in ("stale start", "speed") or all(motion.X_BT is None for motion in program.motions):
         return ()
-    found = []
-    for turn in TURNS:
-        if try_script(_changed(program, turn=float(turn)), cell).passed:
+    found: list[Fix] = []
+    turns = ((turn, _changed(program, turn=float(turn))) for turn in TURNS)
+    for turn, changed in islice((pair for pair in turns if _held(pair[1], failure.index, cell)), FULL_TRIES):
+        if try_script(changed, cell).passed:
             text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg at every pose"
             found.append(Fix(kind="turn about the wire", text=text, turn=float(turn)))
             break
     points = np.stack([motion.X_BT.p for motion in program.motions if motion.X_BT is not None])
+    tries = 0
     for k, move in enumerate(candidates(points)):
         tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
-        if try_script(_changed(program, move=move), cell.moved(move)).passed:
+        changed, there = _changed(program, move=move), cell.moved(move)
+        if not _held(changed, failure.index, there):
+            continue
+        if try_script(changed, there).passed:
             found.append(moved_fix(move))
             break
+        if (tries := tries + 1) >= FULL_TRIES:
+            break
     return tuple(found)
+
+
+def _held(program: Program, index: int, cell: Cell) -> bool:
+    """Whether some posture is clear at the target of one motion."""
+    motion = program.motions[index]
+    solutions = motion.q[None] if motion.X_BT is None else inverse(motion.X_BT @ X_FT.inverse())  # type: ignore[index]
+    return any(not cell.collision.touches(q) for q in solutions)
 
 
 def _changed(program: Program, turn: float = 0.0, move: Float[ndarray, "3"] | None = None) -> Program:
@@ -257,9 +283,9 @@ def turned_about_wire(X_BT: Transform, turn: float) -> Transform:
     return Transform("BT", turned(X_BT.R, turn), X_BT.p)
 
 
-def _quick(path: TorchPath, cell: Cell, config: MotionConfig) -> bool:
+def _quick(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> bool:
     try:
-        return cell.collision(cell.q_start) is None and quick(path, cell, config)
+        return cell.collision(cell.q_start) is None and quick(path, cell, config, first=trial.s_worst)
     except MotionError:
         return False
 

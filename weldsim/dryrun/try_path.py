@@ -1,6 +1,6 @@
 """A torch path tried: every waypoint judged on its own, then the whole motion planned."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -11,39 +11,46 @@ from weldsim.dryrun.verdict import Trial, Verdict, Why
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
+from weldsim.motion.collision import Touch
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.motion.rail import Rail, make_rail
-from weldsim.motion.rungs import Rungs, make_rungs, places
+from weldsim.motion.rungs import Refusal, Rungs, make_rungs, places
 from weldsim.mounts import X_FT
 from weldsim.records import TorchPath
 
 FINE = 0.001  # [m] to which the first place that fails is found
 FASTEST = 0.25  # [m/s] greatest torch speed with the arc, the safety limit of manual mode
 JUMP = np.deg2rad(2.0)  # [rad] two poses may always differ by so much
-COARSE_ROLLS = 18  # rotations about the wire of a coarse look
+COARSE_ROLLS, EXACT_ROLLS = 18, 360  # rotations about the wire of a coarse look, and of the look that refuses
 
 
 def try_path(path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Trial:
     """A verdict for every waypoint of the path, and the motion where it can be done."""
     points, length = path.X_BT.p, float(path.s[-1] - path.s[0])
     base = Trial(name=name, verdicts=_all(path), points_B=points, length=length)
-    spoilt = _spoilt(path, cell, config)
-    if spoilt is not None:
-        first, why, text = spoilt
-        return replace(base, verdicts=_marked(path, {first: (why, text)}, after=first), p_worst=points[first])
+    fault = _spoilt(path, cell, config)
+    if fault is not None:
+        stale = cell.q_start if fault.why == "stale start" else None
+        return replace(base, verdicts=_ended(path, fault), p_worst=points[fault.index], q_worst=stale)
     try:
         rail = make_rail(path, config)
     except MotionError as error:
         index = int(str(error.data.get("index", 0)))
-        return replace(base, verdicts=_marked(path, {index: ("orientation jump", str(error))}, after=index), p_worst=points[index])
+        return replace(
+            base, verdicts=_ended(path, _Fault(index=index, why="orientation jump", text=str(error))), p_worst=points[index]
+        )
     rungs = make_rungs(rail, X_FT, config, cell.collision)
     if rungs.first_refused is not None:
-        return _refused(base, path, rail, rungs, cell, config)
+        found = _first_refused(rail, rungs, cell, config)
+        if found is not None:
+            return _refused(base, path, rail, rungs, *found)
+        config = replace(config, rolls=EXACT_ROLLS)
+        rungs = make_rungs(rail, X_FT, config, cell.collision)
     try:
-        plan = plan_motion(path, cell.q_start, config, blocked=cell.collision)
+        plan = plan_motion(path, cell.q_start, config, blocked=cell.collision, rungs=rungs)
     except MotionError as error:
-        return _failed(base, path, error, rungs)
+        return _failed(base, path, error, rungs, cell)
     return _planned(base, path, plan, config)
 
 
@@ -51,35 +58,52 @@ def _all(path: TorchPath) -> tuple[Verdict, ...]:
     return tuple(Verdict(label=f"pose {i}", index=i, s=float(s)) for i, s in enumerate(path.s))
 
 
-def _marked(path: TorchPath, bad: dict[int, tuple[Why, str]], after: int | None = None) -> tuple[Verdict, ...]:
-    """Verdicts with some poses failed and, from `after` on, the others not reached."""
-    out = []
-    for verdict in _all(path):
-        if verdict.index in bad:
-            why, text = bad[verdict.index]
-            out.append(replace(verdict, why=why, text=text))
-        elif after is not None and verdict.index > after:
-            out.append(replace(verdict, why="not reached", text=f"the motion ends at pose {after}"))
-        else:
-            out.append(verdict)
-    return tuple(out)
+@dataclass(frozen=True, kw_only=True)
+class _Fault:
+    """Why a pose fails. Attributes: index of the pose; why; text; touch, the bodies where any collide."""
+
+    index: int
+    why: Why
+    text: str
+    touch: Touch | None = None
 
 
-def _spoilt(path: TorchPath, cell: Cell, config: MotionConfig) -> tuple[int, Why, str] | None:
+def _failing(verdict: Verdict, fault: _Fault) -> Verdict:
+    first, second, depth = ("", "", 0.0) if fault.touch is None else (fault.touch.first, fault.touch.second, fault.touch.depth)
+    return replace(verdict, why=fault.why, text=fault.text, first=first, second=second, depth=depth)
+
+
+def _ended(path: TorchPath, fault: _Fault) -> tuple[Verdict, ...]:
+    """Verdicts of a motion that ends at one pose: those after it are not reached."""
+    verdicts = _all(path)
+    late = {"why": "not reached", "text": f"the motion ends at pose {fault.index}"}
+    return (
+        *verdicts[: fault.index],
+        _failing(verdicts[fault.index], fault),
+        *(replace(verdict, **late) for verdict in verdicts[fault.index + 1 :]),  # type: ignore[arg-type]
+    )
+
+
+def _spoilt(path: TorchPath, cell: Cell, config: MotionConfig) -> _Fault | None:
     """What is wrong before any posture is looked for: the start, the speed, jumps of orientation."""
     over = np.abs(cell.q_start) > JOINT_LIMIT
     if over.any():
         joint = int(np.flatnonzero(over)[0])
         degrees = np.rad2deg(cell.q_start[joint])
-        return 0, "stale start", f"the arm is said to stand with {JOINT_NAMES[joint]} at {degrees:.0f} deg (limit +-360 deg)"
-    if (touch := cell.collision(cell.q_start)) is not None:
-        return 0, "stale start", f"where the arm stands {touch}; drive it clear, or say where it really stands (--start)"
+        return _Fault(
+            index=0,
+            why="stale start",
+            text=f"the arm is said to stand with {JOINT_NAMES[joint]} at {degrees:.0f} deg (limit +-360 deg)",
+        )
+    if (touch := cell.collision.touch(cell.q_start)) is not None:
+        text = f"where the arm stands {touch}; drive it clear, move the part, or say where it really stands (--start)"
+        return _Fault(index=0, why="stale start", text=text, touch=touch)
     fast = np.flatnonzero(path.speed > FASTEST)
     if len(fast):
-        return (
-            int(fast[0]),
-            "speed",
-            f"{1e3 * path.speed[fast[0]]:.0f} mm/s asked for (limit {1e3 * FASTEST:.0f} mm/s with a torch)",
+        return _Fault(
+            index=int(fast[0]),
+            why="speed",
+            text=f"{1e3 * path.speed[fast[0]]:.0f} mm/s asked for (limit {1e3 * FASTEST:.0f} mm/s with a torch)",
         )
     R = path.X_BT.R
     if path.roll_free:
@@ -93,41 +117,43 @@ def _spoilt(path: TorchPath, cell: Cell, config: MotionConfig) -> tuple[int, Why
         i = int(jumps[0])
         limit = np.rad2deg(max(JUMP, config.joint_rate * ds[i]))
         text = f"the torch turns {np.rad2deg(turn[i]):.1f} deg within {1e3 * ds[i]:.1f} mm (limit {limit:.1f} deg); smooth the path"
-        return i + 1, "orientation jump", text
+        return _Fault(index=i + 1, why="orientation jump", text=text)
     return None
 
 
-def _refused(base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, cell: Cell, config: MotionConfig) -> Trial:
-    """Poses at which no posture will do, the first found to FINE."""
-    refused = np.array([refusal is not None for refusal in rungs.refusals])
-    first = int(np.flatnonzero(refused)[0])
-    s_first, worst = float(rungs.s[first]), rungs
-    if first > 0:
-        s = np.linspace(rungs.s[first - 1], rungs.s[first], max(2, int((rungs.s[first] - rungs.s[first - 1]) / FINE) + 2))
-        worst = make_rungs(rail, X_FT, config, cell.collision, at=s)
-        at = worst.first_refused
-        first, s_first = (len(s) - 1, s_first) if at is None else (at, float(s[at]))
-    refusal = worst.refusals[first]
-    if refusal is None:
-        raise AssertionError("a place that was refused is not")
+def _first_refused(rail: Rail, rungs: Rungs, cell: Cell, config: MotionConfig) -> tuple[float, Refusal] | None:
+    """The first place where no posture will do, to FINE, among rotations about the wire a degree apart; None where one does."""
+    exact = replace(config, rolls=EXACT_ROLLS)
+    for i in (i for i, refusal in enumerate(rungs.refusals) if refusal is not None):
+        before = rungs.s[max(i - 1, 0)]
+        s = np.unique(np.linspace(rungs.s[i], before, int((rungs.s[i] - before) / FINE) + 2)[: -1 if i else None])
+        for at, refusal in zip(s, make_rungs(rail, X_FT, config, cell.collision, at=s).refusals, strict=True):
+            if refusal is not None and rail.roll_free:
+                refusal = make_rungs(rail, X_FT, exact, cell.collision, at=np.array([at])).refusals[0]
+            if refusal is not None:
+                return float(at), refusal
+    return None
+
+
+def _refused(base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, s_first: float, refusal: Refusal) -> Trial:
+    """Poses at which no posture will do, the first of them at s_first [m]."""
     verdicts = list(_all(path))
     nearest = np.abs(path.s[:, None] - rungs.s[None, :]).argmin(axis=1)
     for i, k in enumerate(nearest):
         mine = rungs.refusals[int(k)]
         if mine is not None and path.s[i] >= s_first - 1e-9:
-            verdicts[i] = replace(verdicts[i], why=mine.why, text=mine.text, first=mine.first, second=mine.second, depth=mine.depth)
+            verdicts[i] = _failing(verdicts[i], _Fault(index=i, why=mine.why, text=mine.text, touch=mine.touch))
     lead = "" if rail.start <= s_first <= rail.end else f" on the {'lead-in' if s_first < rail.start else 'lead-out'}"
     index = rail.path_index(s_first)
     text = f"s = {1e3 * s_first:.1f} mm{lead}: {_said(refusal.why, refusal.text, refusal.options, rail)}"
-    verdicts[index] = replace(
-        verdicts[index], why=refusal.why, text=text, first=refusal.first, second=refusal.second, depth=refusal.depth
-    )
-    p = rail.at(np.array([s_first])).p[0]
+    verdicts[index] = _failing(verdicts[index], _Fault(index=index, why=refusal.why, text=text, touch=refusal.touch))
+    before = int(np.searchsorted(rungs.s, s_first, side="right")) - 1
     return replace(
         base,
         verdicts=tuple(verdicts),
-        p_worst=p,
-        q_worst=refusal.q if refusal.q is not None else _last_posture(rungs, first),
+        s_worst=s_first,
+        p_worst=rail.at(np.array([s_first])).p[0],
+        q_worst=refusal.q if refusal.q is not None else _last_posture(rungs, before),
         lead=bool(lead),
     )
 
@@ -146,17 +172,19 @@ def _last_posture(rungs: Rungs, before: int) -> Float[ndarray, "6"] | None:
     return None
 
 
-def _failed(base: Trial, path: TorchPath, error: MotionError, rungs: Rungs) -> Trial:
+def _failed(base: Trial, path: TorchPath, error: MotionError, rungs: Rungs, cell: Cell) -> Trial:
     """Every pose has a posture, and yet no motion joins them."""
     s = float(str(error.data.get("s", path.s[0])))
     index = int(np.abs(path.s - s).argmin())
     why: Why = error.data.get("why", "collision")  # type: ignore[assignment]
-    split = error.data.get("split", ())
-    at = int(np.abs(rungs.s - s).argmin())
+    split, q = error.data.get("split", ()), error.data.get("q", ())
+    q_worst = np.array(q) if isinstance(q, tuple) and len(q) == 6 else _last_posture(rungs, int(np.abs(rungs.s - s).argmin()))
+    touch = cell.collision.touch(q_worst) if why == "collision" and q_worst is not None else None
     return replace(
         base,
-        verdicts=_marked(path, {index: (why, str(error))}, after=index),
-        q_worst=_last_posture(rungs, at),
+        verdicts=_ended(path, _Fault(index=index, why=why, text=str(error), touch=touch)),
+        s_worst=s,
+        q_worst=q_worst,
         p_worst=path.X_BT.p[index],
         lead=not float(path.s[0]) + 1e-6 < s < float(path.s[-1]) - 1e-6,
         split=tuple(split) if isinstance(split, tuple) else (),
@@ -184,20 +212,29 @@ def _planned(base: Trial, path: TorchPath, plan: MotionPlan, config: MotionConfi
         f" ({config.joint_speed_limit:g} rad/s, {config.joint_acceleration_limit:g} rad/s2)"
     )
     index = int(np.abs(path.s - plan.slowest_at).argmin())
-    return replace(out, verdicts=_marked(path, {index: ("speed", text)}), p_worst=path.X_BT.p[index])
+    verdicts = list(_all(path))
+    verdicts[index] = _failing(verdicts[index], _Fault(index=index, why="speed", text=text))
+    return replace(out, verdicts=tuple(verdicts), s_worst=plan.slowest_at, p_worst=path.X_BT.p[index])
 
 
-def quick(path: TorchPath, cell: Cell, config: MotionConfig, length: float = 0.03, turn: float = 0.25) -> bool:
-    """Whether a coarse look finds a sweep of the arm along the path: a sieve for many places, not a verdict."""
+def quick(
+    path: TorchPath, cell: Cell, config: MotionConfig, length: float = 0.03, turn: float = 0.25, first: float | None = None
+) -> bool:
+    """Whether a coarse look finds a sweep of the arm along the path: a sieve for many places, not a verdict.
+
+    Args:
+        length, turn: between places, at most [m], [rad].  first: arc length to be looked at before all others [m].
+    """
     from weldsim.motion.ladder import climb
 
     def blocked(q: Float[ndarray, "6"]) -> str | None:
         return "something" if cell.collision.touches(q) else None
 
     rail = make_rail(path, config)
-    # Its ends first: most places that will not do fail there.
-    coarse = replace(config, rolls=min(config.rolls, COARSE_ROLLS))
-    if make_rungs(rail, X_FT, coarse, blocked, at=rail.s[[0, -1]]).first_refused is not None:
+    # Its ends first, and where it failed before: most places that will not do fail there.
+    suspects = [] if first is None else [first]
+    coarse = replace(config, rolls=min(config.rolls, COARSE_ROLLS), clearance=0.0)
+    if make_rungs(rail, X_FT, coarse, blocked, at=np.unique([rail.s[0], rail.s[-1], *suspects])).first_refused is not None:
         return False
     rungs = make_rungs(rail, X_FT, coarse, blocked, at=places(rail, length, turn))
     return rungs.first_refused is None and climb(rungs, cell.q_start, X_FT, config) is not None

@@ -77,6 +77,7 @@ class Trial:
         name: of the seam or program.  verdicts: one a waypoint.
         t, q: the planned motion as far as there is one [s], [rad]; empty arrays where there is none.
         arc_on: when the arc burns.  cycle: time it takes [s], 0 where it cannot be done.
+        s_worst: arc length of the first failure [m], negative on a lead-in; None where a waypoint says it all.
         q_worst: joint angles at the first failure, to be drawn; None where no posture gets there.  p_worst: its place in B [m].
         points_B: the tip's way, to be drawn.  notes: what else is worth knowing.  length: of the tip's way [m].
         trajectory: the planned motion in full, None where there is none or the program is the robot's own.
@@ -90,6 +91,7 @@ class Trial:
     q: Float[ndarray, "k 6"] = field(default_factory=lambda: np.zeros((0, 6)))
     arc_on: ndarray = field(default_factory=lambda: np.zeros(0, bool))
     cycle: float = 0.0
+    s_worst: float | None = None
     q_worst: Float[ndarray, "6"] | None = None
     p_worst: Float[ndarray, "3"] | None = None
     points_B: Float[ndarray, "n 3"] = field(default_factory=lambda: np.zeros((0, 3)))
@@ -164,7 +166,7 @@ def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
         "waypoints": [
             {"from": a.index, "to": b.index, "s": [a.s, b.s], **_verdict_json(a), "label": a.label} for a, b in runs(trial.verdicts)
         ],
-        "first_failure": None if failure is None else {"index": failure.index, "s": failure.s, **_verdict_json(failure)},
+        "first_failure": None if failure is None else _failure_json(trial, failure),
         "fixes": [
             {
                 "kind": fix.kind,
@@ -180,6 +182,17 @@ def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
             for fix in fixes
         ],
         "notes": list(trial.notes),
+    }
+
+
+def _failure_json(trial: Trial, failure: Verdict) -> dict[str, Any]:
+    """The waypoint, and exactly where and how the arm stands or would have to."""
+    return {
+        "index": failure.index,
+        "s": failure.s if trial.s_worst is None else round(trial.s_worst, 6),
+        **_verdict_json(failure),
+        "position": None if trial.p_worst is None else np.round(trial.p_worst, 6).tolist(),
+        "joints": None if trial.q_worst is None else np.round(trial.q_worst, 9).tolist(),
     }
 
 

@@ -12,7 +12,7 @@ from weldsim.kinematics import JOINT_LIMIT, inverse_near, torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import LostPathError
 from weldsim.motion.roam import roam
-from weldsim.motion.sweep import Blocked, touched
+from weldsim.motion.sweep import Blocked, first_touch, posture_at, touched
 from weldsim.motion.timing import Move, air_move
 
 LIFTS = (0.0, 0.1, 0.2, 0.3)  # [m] how far back along the wire a detour begins, tried in order
@@ -58,7 +58,14 @@ def air_moves(
         and (corners := roam(*((q_rail, q_home) if back else (q_home, q_rail)), blocked, tries=ROAMS)) is not None
     ):
         return [air_move(a, b, s, config, X_FT) for a, b in pairwise(corners)]
-    raise LostPathError(f"the air move {'home' if back else 'to the weld'}: {touch}", s=s, reason=f"{touch}")
+    ends = np.stack((q_rail, q_home) if back else (q_home, q_rail))
+    straight = None if blocked is None else first_touch(ends, blocked)
+    raise LostPathError(
+        f"the air move {'home' if back else 'to the weld'}: {touch}",
+        s=s,
+        reason=f"{touch}",
+        q=() if straight is None else tuple(posture_at(ends, straight[0])),
+    )
 
 
 def _lifted(q: Float[ndarray, "6"], lift: float, X_FT: Transform) -> Float[ndarray, "6"] | None:

@@ -16,7 +16,7 @@ from weldsim.kinematics import torch_pose
 from weldsim.motion.arm import TORCH_SITE
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rail import Rail
-from weldsim.motion.sweep import STEP_LENGTH, Blocked, first_touch
+from weldsim.motion.sweep import STEP_LENGTH, Blocked, first_touch, posture_at
 from weldsim.records import Segment
 
 POSITION_COST, AXIS_COST, POSTURE_COST = 10.0, 3.0, 1e-3  # [1/m], [1/rad], [1/rad]: posture bends the tip by under 1 um
@@ -166,7 +166,8 @@ def check_clear(paths: list[JointPath], blocked: Blocked) -> None:
         found = first_touch(path.spline(s), blocked)
         if found is not None:
             at = float(np.interp(found[0], np.arange(len(s)), s))
-            raise LostPathError(f"s = {1e3 * at:.1f} mm: {found[1]}", s=at, reason=found[1])
+            q = posture_at(path.spline(s), found[0])
+            raise LostPathError(f"s = {1e3 * at:.1f} mm: {found[1]}", s=at, reason=found[1], q=tuple(q))
 
 
 def _strayed(

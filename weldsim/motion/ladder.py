@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, inverse
+from weldsim.motion.collision import Touch
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rungs import Rungs, branch_of, turned
 from weldsim.motion.sweep import Blocked
@@ -30,6 +31,7 @@ TRAVEL, ROLLING, STARTING, STANDING = (
     0.3,
     4.0,
 )  # weights of joint travel, roll travel, way from the start, mean node cost
+TOUCHING, TOUCH_DEPTH = 1e3, 1e-5  # cost of a posture that touches something, and [m] that costs one more, among blocked climbs
 SMOOTHINGS = (3.0, 1.5, 0.7, 0.0)  # rungs over which the rotation about the wire is smoothed, tried in order
 COMFORT = 0.6  # [rad] from a joint's end stop at which it begins to count
 CRAMPED = 3 * np.pi  # [rad] of travel from the start worth taking so as not to weld at a stop: a whole turn from a third of COMFORT
@@ -186,6 +188,32 @@ def break_at(rungs: Rungs, limit: float) -> tuple[float, float]:
     else:
         last = int(np.flatnonzero(np.isfinite(up))[-1]) if np.isfinite(up).any() else 0
     return float(rungs.s[last]), float(rungs.s[min(last + 1, len(rungs.s) - 1)])
+
+
+def wound_up(rungs: Rungs, limit: float) -> list[int]:
+    """Joints that the best climb would turn beyond `limit` [rad]; none where there is no climb at all."""
+    search = _forward(rungs.q, rungs.cost, np.full(6, np.nan), (), np.inf)
+    if not np.isfinite(search.total[-1]).any():
+        return []
+    return _within(_descended(rungs, search)[2], np.zeros(6), (), limit)[1]
+
+
+def least_blocked(rungs: Rungs) -> tuple[int, Float[ndarray, "6"], Touch] | None:
+    """Of the climbs that obstacles forbid, the one that touches least: the place where it does so deepest, the posture [rad], and
+    what it touches there. None where there would be no climb without obstacles either, or nothing is touched."""
+    cost = rungs.cost.copy()
+    for index, touch in rungs.touches.items():
+        cost[index] = TOUCHING + touch.depth / TOUCH_DEPTH
+    search = _forward(rungs.q, cost, np.full(6, np.nan), (), np.inf)
+    if not np.isfinite(search.total[-1]).any():
+        return None
+    roll, branch, _ = _descended(rungs, search)
+    nodes = np.rint(roll * len(rungs.rolls) / (2 * np.pi)).astype(int) % len(rungs.rolls)
+    touched = [(i, int(r), branch) for i, r in enumerate(nodes) if (i, int(r), branch) in rungs.touches]
+    if not touched:
+        return None
+    node = max(touched, key=lambda node: rungs.touches[node].depth)
+    return node[0], rungs.q[node], rungs.touches[node]
 
 
 def near(rungs: Rungs, hold: Hold, s: float, reach: int = 1) -> Bool[ndarray, "w r 8"]:

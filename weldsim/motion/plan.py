@@ -17,7 +17,7 @@ from weldsim.motion.follow import JointPath, LostPathError, check_clear, follow
 from weldsim.motion.ladder import Hold, climb, near
 from weldsim.motion.rail import Rail, make_rail
 from weldsim.motion.refuse import refused, unreachable
-from weldsim.motion.rungs import make_rungs
+from weldsim.motion.rungs import Rungs, make_rungs
 from weldsim.motion.sweep import Blocked
 from weldsim.motion.timing import Move, piece_move
 from weldsim.mounts import X_FT as NOMINAL_X_FT
@@ -62,6 +62,7 @@ def plan_motion(
     config: MotionConfig | None = None,
     X_FT: Transform = NOMINAL_X_FT,
     blocked: Blocked | None = None,
+    rungs: Rungs | None = None,
 ) -> MotionPlan:
     """The joint trajectory that welds the path: air move, lead-in, weld at the path's speed, lead-out, air move home.
 
@@ -72,6 +73,7 @@ def plan_motion(
         path: torch poses; leads are added along the wire where it has none.
         q_start: joint angles at t = 0 [rad].
         X_FT: flange to torch tip.
+        rungs: of the path's own rail with the same settings, where they have been made already.
         blocked: names what a configuration touches, or None (`CellCollision`); nothing planned then touches anything, as
             far as samples of the motion show. Without it only the arm's centre lines are kept clear of table and torch.
     Raises:
@@ -84,7 +86,7 @@ def plan_motion(
         joint = int(np.flatnonzero(~inside)[0])
         raise MotionError(f"start: {JOINT_NAMES[joint]} at {np.rad2deg(q_start[joint]):.0f} deg (limit +-360 deg)", joint=joint)
     try:
-        return _in_one(path, q_start, q_start if config.return_home else None, config, X_FT, blocked)
+        return _in_one(path, q_start, q_start if config.return_home else None, config, X_FT, blocked, rungs)
     except MotionError as error:
         split = error.data.get("split")
         if not isinstance(split, tuple) or not split:
@@ -139,10 +141,11 @@ def _in_one(
     config: MotionConfig,
     X_FT: Transform,
     blocked: Blocked | None,
+    rungs: Rungs | None = None,
 ) -> MotionPlan:
     """The plan of a path in a single sweep, from q_start and in the end to q_home, where that is given."""
     rail = make_rail(path, config)
-    hold, paths, moves = _first_that_holds(rail, q_start, q_home, X_FT, config, blocked)
+    hold, paths, moves = _first_that_holds(rail, q_start, q_home, X_FT, config, blocked, rungs)
     q = np.concatenate([path.spline(path.spline.x) for path in paths])
     clearance = float(clearances(q, config.floor, X_FT).min())
     weld = next(move for move in moves if move.segment == Segment.WELD)
@@ -177,6 +180,7 @@ def _first_that_holds(
     X_FT: Transform,
     config: MotionConfig,
     blocked: Blocked | None,
+    rungs: Rungs | None,
 ) -> tuple[Hold, list[JointPath], list[Move]]:
     """The best way to hold the arm that can be followed all along and reached through the air, with its joint paths and moves.
 
@@ -184,7 +188,7 @@ def _first_that_holds(
     """
     if blocked is not None and (touch := blocked(q_start)) is not None:
         raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch, why="stale start")
-    rungs, model = make_rungs(rail, X_FT, config, blocked), kinematic_model(X_FT)
+    rungs, model = rungs or make_rungs(rail, X_FT, config, blocked), kinematic_model(X_FT)
     banned = np.zeros(rungs.cost.shape, bool)
     lost: list[LostPathError] = []
     for attempt in range(config.candidates):
@@ -208,7 +212,12 @@ def _first_that_holds(
     index = rail.path_index(s)
     why = {"branch flip": "joint jump", "joint limit": "joint limit", "rough path": "orientation jump"}.get(reason, "collision")
     raise MotionError(
-        f"path pose {index}: no posture gets further than {furthest}", index=index, s=s, reason=reason, why=why
+        f"path pose {index}: no posture gets further than {furthest}",
+        index=index,
+        s=s,
+        reason=reason,
+        why=why,
+        q=furthest.data.get("q", ()),
     ) from furthest
 
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from weldsim.errors import MotionError, UnreachableError
 from weldsim.frames import Transform
-from weldsim.kinematics import D1, JOINT_LIMIT, REACH, inverse
+from weldsim.kinematics import D1, JOINT_LIMIT, JOINT_NAMES, REACH, inverse
 from weldsim.motion.config import MotionConfig
-from weldsim.motion.ladder import break_at, cuts
+from weldsim.motion.ladder import break_at, cuts, least_blocked, wound_up
 from weldsim.motion.rail import Rail
 from weldsim.motion.rungs import Rungs, turned
 
@@ -36,7 +36,8 @@ def refused(rail: Rail, rungs: Rungs, X_FT: Transform, config: MotionConfig) -> 
         s=s,
         reason=refusal.text,
         why="collision",
-        depth=refusal.depth,
+        touch=refusal.touch,
+        q=() if refusal.q is None else tuple(refusal.q),
     )
 
 
@@ -44,15 +45,22 @@ def _broken(rail: Rail, rungs: Rungs, limit: float) -> MotionError:
     """Every place has a posture, but no continuous motion joins them all; `data`: split, cuts between which motions do [m]."""
     last, after = break_at(rungs, limit)
     split = tuple(cuts(rungs, limit, (rail.start, rail.end)) or ())
+    told: dict[str, object] = {"reason": "branch flip", "why": "joint jump"}
+    without = "without branch flip"
+    if wound := wound_up(rungs, limit):
+        told = {"reason": "joint limit", "why": "joint limit"}
+        without = f"without {' and '.join(JOINT_NAMES[joint] for joint in wound)} at its end stop (+-{np.rad2deg(limit):.0f} deg)"
+    elif (blocked := least_blocked(rungs)) is not None:
+        at, q, touch = blocked
+        told = {"reason": str(touch), "why": "collision", "touch": touch, "q": tuple(q)}
+        without = f"clear of obstacles (in the one that touches least, {touch} at s = {1e3 * rungs.s[at]:.1f} mm)"
     advice = "" if split else "; move the part or change the torch angles"
     return MotionError(
-        f"{where(rail, after)}: no sweep of the arm without branch flip, collision or end stop goes beyond"
-        f" s = {1e3 * last:.1f} mm{advice}",
+        f"{where(rail, after)}: no sweep of the arm {without} goes beyond s = {1e3 * last:.1f} mm{advice}",
         index=rail.path_index(after),
         s=after,
-        reason="branch flip",
-        why="joint jump",
         split=split,
+        **told,
     )
 
 

@@ -4,7 +4,8 @@ A place, a rotation about the wire and one of eight branches name a joint soluti
 factors of the UR arm's Jacobian determinant (elbow, wrist, shoulder): it cannot be left without passing a singularity.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from weldsim.frames import Transform
-from weldsim.kinematics import A2, A3, D5, inverse
+from weldsim.kinematics import A2, A3, D5, inverse_of_many
 from weldsim.motion.arm import clearances, dexterity
 from weldsim.motion.collision import NEAR, CellCollision, Touch
 from weldsim.motion.config import MotionConfig
@@ -34,16 +35,14 @@ class Refusal:
     Attributes:
         why: kind.  text: for people.  options: postures tried.
         q: the posture that comes nearest to doing [rad], None where the place is out of reach.
-        first, second: bodies that collide in it, where they are known.  depth: how deep [m].
+        touch: what collides in it, where something does.
     """
 
     why: Why
     text: str
     options: int = 0
     q: Float[ndarray, "6"] | None = None
-    first: str = ""
-    second: str = ""
-    depth: float = 0.0
+    touch: Touch | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,6 +55,7 @@ class Rungs:
         q: (w, r, 8, 6) joint angles in (-pi, pi], NaN where the branch has no solution.
         cost: (w, r, 8) less is better, inf where the posture cannot be used.
         refusals: one for each place, None where some posture will do.
+        touches: by (place, rotation, branch), what the postures touch that cannot be used for that alone.
     """
 
     s: Float[ndarray, "w"]
@@ -65,6 +65,7 @@ class Rungs:
     q: Float[ndarray, "w r 8 6"]
     cost: Float[ndarray, "w r 8"]
     refusals: tuple[Refusal | None, ...]
+    touches: Mapping[tuple[int, ...], Touch] = field(default_factory=dict)
 
     @property
     def first_refused(self) -> int | None:
@@ -86,14 +87,12 @@ def make_rungs(
     rolls = 2 * np.pi * np.arange(count) / count
     frames = roll_frames(X_BT) if rail.roll_free else X_BT.R
     q = np.full((len(s), count, 8, 6), np.nan)
-    X_TF = X_FT.inverse()
-    for i in range(len(s)):
-        for k, roll in enumerate(rolls):
-            solutions = inverse(Transform("BT", turned(frames[i], roll), X_BT.p[i]) @ X_TF)
-            if len(solutions):
-                q[i, k, branch_of(solutions)] = solutions
-    cost, refusals = _judged(q, X_FT, config, blocked)
-    return Rungs(s=s, frames=frames, p=X_BT.p, rolls=rolls, q=q, cost=cost, refusals=refusals)
+    R, p = turned(np.repeat(frames, count, axis=0), np.tile(rolls, len(s))), np.repeat(X_BT.p, count, axis=0)
+    solutions, pose = inverse_of_many((Transform("BT", R, p) @ X_FT.inverse()).matrix)
+    q[pose // count, pose % count, branch_of(solutions)] = solutions
+    cost, touches = _obstacle_cost(q, _posture_cost(q, X_FT, config), blocked)
+    refusals = tuple(_refusal(i, q[i], cost[i], touches) for i in range(len(s)))
+    return Rungs(s=s, frames=frames, p=X_BT.p, rolls=rolls, q=q, cost=cost, refusals=refusals, touches=touches)
 
 
 def branch_of(q: Float[ndarray, "*n 6"]) -> Int[ndarray, "*n"]:
@@ -130,20 +129,25 @@ def places(rail: Rail, length: float = LENGTH, turn: float = TURN) -> Float[ndar
     return np.unique(np.interp(np.linspace(0.0, gone[-1], max(3, int(np.ceil(gone[-1])) + 1)), gone, s))
 
 
-def _judged(
-    q: Float[ndarray, "w r 8 6"], X_FT: Transform, config: MotionConfig, blocked: Blocked | None
-) -> tuple[Float[ndarray, "w r 8"], tuple[Refusal | None, ...]]:
-    """Cost of each posture, by singularities, table and obstacles, and why there is none where there is none."""
+def _posture_cost(q: Float[ndarray, "w r 8 6"], X_FT: Transform, config: MotionConfig) -> Float[ndarray, "w r 8"]:
+    """Cost of each posture by singularities and the table."""
     there = ~np.isnan(q[..., 0])
     cost = np.full(there.shape, np.inf)
     agile = np.zeros(there.shape)
     if there.any():
         agile[there] = dexterity(q[there], X_FT)
-        free = clearances(q[there], config.floor, X_FT)
-        near = np.clip(1.0 - free / max(config.clearance, 1e-9), 0.0, 1.0)
-        cost[there] = 2.0 * (SHY / np.clip(agile[there], SINGULAR, SHY)) - 2.0 + 20.0 * near
+        cost[there] = 2.0 * (SHY / np.clip(agile[there], SINGULAR, SHY)) - 2.0
+    if there.any() and config.clearance > 0:
+        cost[there] += 20.0 * np.clip(1.0 - clearances(q[there], config.floor, X_FT) / config.clearance, 0.0, 1.0)
     cost[there & (agile < SINGULAR)] = np.inf
-    touches: dict[tuple[int, ...], Touch] = {}
+    return cost
+
+
+def _obstacle_cost(
+    q: Float[ndarray, "w r 8 6"], clear: Float[ndarray, "w r 8"], blocked: Blocked | None
+) -> tuple[Float[ndarray, "w r 8"], dict[tuple[int, ...], Touch]]:
+    """The cost with obstacles, and what the postures touch that they forbid."""
+    cost, touches = clear.copy(), {}
     if blocked is not None:
         for index in zip(*np.nonzero(np.isfinite(cost)), strict=True):
             found, gap = _touch(q[index], blocked)
@@ -152,7 +156,7 @@ def _judged(
                 touches[tuple(int(i) for i in index)] = found
             else:
                 cost[index] += 0.5 * (NEAR / max(gap, SPEEDLESS) - 1.0)
-    return cost, tuple(_refusal(i, q[i], cost[i], touches) for i in range(len(q)))
+    return cost, touches
 
 
 def _touch(q: Float[ndarray, "6"], blocked: Blocked) -> tuple[Touch | None, float]:
@@ -165,7 +169,7 @@ def _touch(q: Float[ndarray, "6"], blocked: Blocked) -> tuple[Touch | None, floa
 
 
 def _refusal(
-    i: int, q: Float[ndarray, "r 8 6"], cost: Float[ndarray, "r 8"], touches: dict[tuple[int, ...], Touch]
+    i: int, q: Float[ndarray, "r 8 6"], cost: Float[ndarray, "r 8"], touches: Mapping[tuple[int, ...], Touch]
 ) -> Refusal | None:
     """Why no posture of one place will do, None where one will."""
     if np.isfinite(cost).any():
@@ -176,14 +180,6 @@ def _refusal(
     mine = {index[1:]: touch for index, touch in touches.items() if index[0] == i}
     if mine:
         index, touch = min(mine.items(), key=lambda item: item[1].depth)
-        return Refusal(
-            why="collision",
-            text=str(touch),
-            options=len(mine),
-            q=q[index],
-            first=touch.first,
-            second=touch.second,
-            depth=touch.depth,
-        )
+        return Refusal(why="collision", text=str(touch), options=len(mine), q=q[index], touch=touch)
     text = "every joint solution is at a singularity"
     return Refusal(why="singular", text=text, options=int(there.sum()), q=q[there][0])

@@ -45,3 +45,9 @@ def first_touch(q: Float[ndarray, "n 6"], blocked: Blocked) -> tuple[float, str]
             if (touch := blocked(q[i] + k / n * (q[i + 1] - q[i]))) is not None:
                 return i + k / n, touch
     return None
+
+
+def posture_at(q: Float[ndarray, "n 6"], index: float) -> Float[ndarray, "6"]:
+    """The posture [rad] at an index with its fraction, as `first_touch` gives it."""
+    i = min(int(index), len(q) - 2)
+    return q[i] + (index - i) * (q[i + 1] - q[i])
