@@ -49,7 +49,7 @@ def _broken(rail: Rail, rungs: Rungs, limit: float) -> MotionError:
     without = "without branch flip"
     if wound := wound_up(rungs, limit):
         told = {"reason": "joint limit", "why": "joint limit"}
-        without = f"without {' and '.join(JOINT_NAMES[joint] for joint in wound)} at its end stop (+-{np.rad2deg(limit):.0f} deg)"
+        without = f"that keeps {' and '.join(JOINT_NAMES[joint] for joint in wound)} from its end stop"
     elif (blocked := least_blocked(rungs)) is not None:
         at, q, touch = blocked
         told = {"reason": str(touch), "why": "collision", "touch": touch, "q": tuple(q)}
