@@ -18,6 +18,7 @@ from weldsim.records import MILLIMETRE_SPAN, Segment, TorchPath
 
 SCRIPTS = (".script", ".urscript", ".ur")
 LONGEST_TURN = 2 * np.pi + 1e-6  # [rad] of a rotation vector
+SHORTEST = 1e-6  # [m] of a path
 FURTHEST = 3.0  # [m] from the base: further is a unit mistaken
 HALF_TURN = Transform("BB", np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
 
@@ -94,10 +95,10 @@ def _text(path: Path) -> str:
 def _csv(path: Path, text: str, tool: Tool | None, base: Base, speed: MetrePerSecond, roll_free: bool) -> Program:
     rows = [(number, row.strip()) for number, row in enumerate(text.splitlines(), 1) if row.strip()]
     comments = " ".join(row for _, row in rows if row.startswith("#"))
-    body = [(number, row.replace(";", ",").split(",")) for number, row in rows if not row.startswith("#")]
+    body = [(number, _cells(row.partition("#")[0])) for number, row in rows if not row.startswith("#")]
     head: list[str] = []
-    if body and any(_number(cell) is None for cell in body[0][1][-6:]):
-        head, body = [cell.strip().lower() for cell in body[0][1]], body[1:]
+    if body and all(_number(cell) is None for cell in body[0][1][-6:]):
+        head, body = _head(path, *body[0]), body[1:]
     labels, poses = _poses(path, head, body)
     told = "tool0" if "tool0" in comments else "torch" if "torch" in comments else None
     notes = []
@@ -127,6 +128,8 @@ def _csv(path: Path, text: str, tool: Tool | None, base: Base, speed: MetrePerSe
                 roll_free=roll_free,
             )
         )
+        if paths[-1].s[-1] < SHORTEST:
+            raise InputError(f"{path}: {name}: all {len(mine)} poses are in one place; a path has a length", path=str(path))
         names.append(name)
     return Program(source=path.name, kind="csv", paths=tuple(paths), names=tuple(names), notes=tuple(notes))
 
@@ -147,7 +150,8 @@ def _poses(path: Path, head: list[str], body: list[tuple[int, list[str]]]) -> tu
         if len(cells) != (len(head) or 6):
             raise InputError(
                 f"{path}: line {number}: {len(cells)} columns, expected {len(head) or 6}: x y z rx ry rz [m, rad]"
-                + (" (x y z and a quaternion are no UR pose)" if len(cells) == 7 else ""),
+                + (" (x y z and a quaternion are no UR pose)" if len(cells) == 7 else "")
+                + (" (decimal commas need ; between the columns)" if len(cells) == 12 else ""),
                 path=str(path),
                 line=number,
             )
@@ -179,6 +183,25 @@ def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> N
             line=lines[worst],
             value=float(turn[worst]),
         )
+
+
+def _cells(row: str) -> list[str]:
+    """A row's cells, between semicolons or tabs (numbers may then have decimal commas), commas, or blanks."""
+    mark = next((mark for mark in (";", "\t", ",") if mark in row), None)
+    cells = row.split(mark)
+    return [cell.strip().strip('"').replace(",", ".") for cell in cells]
+
+
+def _head(path: Path, number: int, cells: list[str]) -> list[str]:
+    """Names of the columns; a unit in brackets may follow each."""
+    names = []
+    for cell in cells:
+        name, _, unit = cell.lower().replace("(", "[").partition("[")
+        if (unit := unit.strip(" ])")) not in ("", "m", "rad", "m/s"):
+            message = f"{path}: line {number}: column {name.strip()} is in {unit}; metres and radians are needed"
+            raise InputError(message, path=str(path), line=number)
+        names.append(name.strip())
+    return names
 
 
 def _number(text: str) -> float | None:

@@ -26,6 +26,8 @@ from weldsim.records import MILLIMETRE_SPAN, Seam, Segment, TorchPath
 SCHEMA = "weldsim.path/1"
 DECIMALS = 9  # a nanometre, a nanoradian: below any sensor, above the rounding noise of another machine
 QUATERNION_TOLERANCE = 1e-6
+SHORTEST = 1e-6  # [m] of a path
+MOST_OFF = 2.0  # by which factor s may differ from the way along the positions: those of a bend may be few
 
 
 def path_document(
@@ -117,7 +119,7 @@ def read_path_json(path: Path | str) -> dict[str, Any]:
             that is not finite, a quaternion that is not of unit length, coordinates that look like millimetres.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = Path(path).read_text(encoding="utf-8-sig")
         document = json.loads(text)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})", path=str(path)) from error
@@ -230,6 +232,14 @@ def _check_seam(seam: Any, where: str) -> None:
         _need(
             span <= MILLIMETRE_SPAN, f"{where}.{name}", f"spans {span:.4g} m (limit {MILLIMETRE_SPAN:g} m): looks like millimetres"
         )
+    way = float(np.linalg.norm(np.diff(position, axis=0), axis=1).sum())
+    _need(way > SHORTEST, where, f"all {len(poses)} poses are in one place; a path has a length")
+    told = float(s[-1] - s[0])
+    _need(
+        way / MOST_OFF <= told <= MOST_OFF * way,
+        where,
+        f"s goes over {told:.4g} m, the positions over {way:.4g} m (limit {MOST_OFF:g} times); s is the arc length in metres",
+    )
     defect = np.abs(np.linalg.norm(quaternion, axis=1) - 1.0)
     worst = int(defect.argmax())
     _need(

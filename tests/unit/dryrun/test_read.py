@@ -136,6 +136,11 @@ def test_a_script_is_read_in_the_order_in_which_it_moves(tmp_path, newline):
         ("p.csv", f"{POSE}\nnan,0,0,0,0,0\n", "line 2"),
         ("p.csv", f"{POSE}\n12.0,-450.0,100.0,3.1,0,0\n", "millimetres"),
         ("p.csv", f"{POSE}\n0,-0.45,0.1,180.0,0,0\n", "degrees"),
+        ("p.csv", f"x [mm],y [mm],z [mm],rx,ry,rz\n{POSE}\n{POSE}\n", "line 1: column x is in mm"),
+        ("p.csv", f"{POSE}\n{POSE}\n".replace(".", ","), "line 1: .* columns"),
+        ("p.csv", f"{POSE}\n{POSE}\n", "all 2 poses are in one place"),
+        ("p.json", json.dumps(_document(poses=[{**p, "s": 1e3 * p["s"]} for p in _poses()])), "arc length in metres"),
+        ("p.json", json.dumps(_document(poses=[{**p, "position": [0, -0.4, 0.1]} for p in _poses()])), "in one place"),
         ("p.csv", f"x,y,z,a,b,c\n{POSE}\n{POSE}\n", "column rx"),
         ("p.script", "def a():\nend\n", "nothing to check"),
         ("p.script", f"movel(p[{POSE}])", "1 motion"),
@@ -179,3 +184,25 @@ def test_a_missing_file_is_one_line(tmp_path):
 
 def test_paths_of_tests_have_the_form_that_is_read():
     assert torch_path(flat_curve("line", 0.1), np.array([0, 0, -1.0])).roll_free
+
+
+@pytest.mark.parametrize(
+    "spelt",
+    [
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", ";").replace(".", ","),
+        lambda text: text.replace(",", "\t"),
+        lambda text: text.replace(",", " "),
+        lambda text: "X [m], Y [m], Z [m], RX [rad], RY [rad], RZ [rad]\r\n" + text.replace("\n", "\r\n"),
+        lambda text: "\n".join(",".join(f'"{cell}"' for cell in row.split(",")) for row in text.splitlines()),
+        lambda text: text.replace("\n", "  # weld\n\n"),
+    ],
+)
+def test_a_csv_may_be_written_in_other_ways(tmp_path, spelt):
+    text = "0.1,-0.45,0.1,3.1,0,0.01\n0.12,-0.45,0.1,3.1,0,0.01\n0.14,-0.45,0.1,3.1,0,0.02\n"
+    plain, other = tmp_path / "plain.csv", tmp_path / "other.csv"
+    plain.write_text(text)
+    other.write_text(spelt(text))
+    one, two = read_program(plain).paths[0], read_program(other).paths[0]
+    assert np.array_equal(one.X_BT.p, two.X_BT.p)
+    assert np.array_equal(one.X_BT.R, two.X_BT.R)
