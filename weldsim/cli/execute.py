@@ -159,7 +159,8 @@ class Execute(ConfigOptions):
 
             found = checks(done.report, limits_for(config, scene))
             rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in found]
-            print(table(rows, ("figure", "measured", "limit", "")))
+            if rows:
+                print(table(rows, ("figure", "measured", "limit", "")))
             for reason in () if done.report.passed else done.report.reasons:
                 print(f"  {reason}")
         if done.log is not None:

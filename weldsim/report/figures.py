@@ -14,10 +14,11 @@ from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindi
 from weldsim.report.limits import ReportConfig
 from weldsim.report.style import CENTRE, GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
-from weldsim.report.view import CrossSection, ErrorLine, height_range, heights, shown, torch_axes, view_frame
+from weldsim.report.view import CrossSection, ErrorLine, height_range, heights, shown, shows_surface, torch_axes, view_frame
 
 Figure = dict[str, Any]
 CLOUD_LIMIT = 60_000  # points drawn
+LONGEST = 1.8  # side of the scene, in units of plotly's camera, that can be seen whole
 LINE_LIMIT = 3000  # samples drawn of one line
 
 
@@ -37,7 +38,7 @@ def scene(
     low, high = height_range(height, findings.seams)
     colour = {"color": _array(1e3 * height), "colorscale": "Cividis", "cmin": 1e3 * low, "cmax": 1e3 * high}
     bar = {"title": {"text": "height [mm]", "side": "right"}, "thickness": 12, "len": 0.6, "x": 1.0, "outlinewidth": 0}
-    data = [_dots("cloud", points, {"size": 2.2, **colour, "colorbar": bar})]
+    data = [_dots("cloud", points, {"size": 2.2, **colour, "colorbar": bar})] if shows_surface(cloud, findings.seams) else []
     if len(groove):
         data.append(_dots("groove region", groove, {"size": 2.4, "color": REGION}))
     for i, seam in enumerate(findings.seams):
@@ -63,13 +64,22 @@ def scene(
     layout |= {
         "scene": {
             **{f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}} for name in "xyz"},
-            "aspectmode": "data",
+            **_aspect(points, *(torch_axes(path).reshape(-1, 3) for path in paths if path is not None)),
             "camera": {"eye": _xyz((1.25 if findings.seams else 1.4) * eye), "up": _xyz(X_BS.R[:, 2])},
         },
         "margin": {"l": 0, "r": 0, "t": 8, "b": 0},
         "legend": {"orientation": "h", "y": 0.01, "x": 0.01, "bgcolor": "rgba(255,255,255,0.8)", "itemsizing": "constant"},
     }
     return {"data": data, "layout": layout}
+
+
+def _aspect(*points_B: ndarray) -> Figure:
+    """True proportions; of what is long and thin no more than fits into the view."""
+    span = np.ptp(np.concatenate(points_B), axis=0)
+    shape = span / np.cbrt(span.prod()) if span.min() > 0 else np.ones(3)  # as plotly scales "data"
+    if shape.max() <= LONGEST:
+        return {"aspectmode": "data"}
+    return {"aspectmode": "manual", "aspectratio": _xyz(shape * LONGEST / shape.max())}
 
 
 def uncertainty(seam: Seam) -> Figure:

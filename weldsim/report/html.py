@@ -10,7 +10,7 @@ from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
 from weldsim.report import figures
 from weldsim.report.limits import Check, ReportConfig, checks, verdict
-from weldsim.report.view import cross_section, error_lines
+from weldsim.report.view import cross_section, error_lines, shows_surface
 
 STYLE = """
 :root{--ink:#1c2733;--soft:#66727f;--line:#e3e7eb;--good:#1b7f4b;--bad:#b3261e;--plain:#12355b}
@@ -111,9 +111,8 @@ def _plots(
         out.append(_figure(drawn, "Cross-track distance", figures.errors_distance(lines, config)))
     if welded < len(findings.seams):
         seam = findings.seams[welded]
-        cut = cross_section(cloud, seam)
-        if len(cut.across):  # a path that came from a file has no cloud about it
-            out.append(_figure(drawn, "Mean cross-section", figures.section(cut)))
+        if shows_surface(cloud, (seam,)):  # a path that came from a file has no cloud about it
+            out.append(_figure(drawn, "Mean cross-section", figures.section(cross_section(cloud, seam))))
         if seam.sigma is not None or seam.left_B is not None:
             out.append(_figure(drawn, "Standard deviation and width along the seam", figures.uncertainty(seam)))
     path = paths[welded] if welded < len(paths) else None

@@ -20,7 +20,18 @@ from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import ReportConfig, verdict
 from weldsim.report.style import BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
-from weldsim.report.view import MARGIN, CrossSection, cross_section, error_lines, height_range, heights, torch_axes, view_frame
+from weldsim.report.tracking import speed_error
+from weldsim.report.view import (
+    MARGIN,
+    CrossSection,
+    cross_section,
+    error_lines,
+    height_range,
+    heights,
+    shows_surface,
+    torch_axes,
+    view_frame,
+)
 
 EMPTY = "#eef1f4"
 OBLIQUE = np.array([0.25, 0.55])
@@ -46,10 +57,14 @@ def write_png(
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, top=0.86, bottom=0.08, width_ratios=(1.75, 1), hspace=0.34, wspace=0.16)
     _headline(figure, report, findings, config or ReportConfig())
-    _plan_view(figure, figure.add_subplot(grid[:, 0]), cloud, findings, paths)
+    surface = shows_surface(cloud, findings.seams)
+    _plan_view(figure, figure.add_subplot(grid[:, 0]), cloud, findings, paths, surface=surface)
     upper, lower = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
     if findings.seams:
-        _section(upper, cross_section(cloud, findings.seams[welded]))
+        if surface:
+            _section(upper, cross_section(cloud, findings.seams[welded]))
+        else:
+            _speed(upper, log, paths[welded], config or ReportConfig())
         _along(lower, findings, paths, log, known, welded)
     else:
         _refused(upper, findings)
@@ -84,22 +99,25 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
     figure.text(0.97, 0.905, why, fontsize=12, color=SOFT, va="center", ha="right")
 
 
-def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFindings, paths: tuple[TorchPath | None, ...]) -> None:
-    """The cloud as heights over the parent surface, seen along its normal, with lips, centre line and wires."""
+def _plan_view(
+    figure: Figure,
+    axes: Axes,
+    cloud: PointCloud,
+    findings: SeamFindings,
+    paths: tuple[TorchPath | None, ...],
+    *,
+    surface: bool,
+) -> None:
+    """The cloud as heights over the parent surface, where it shows one, seen along its normal; lips, centre line and wires."""
     X_BS = view_frame(cloud, findings.seams)
     X_SB = X_BS.inverse()
     points = X_SB.points(cloud.points)
     window = _window(points, [X_SB.points(seam.points_B) for seam in findings.seams])
-    seen = ((points[:, :2] >= window[0]) & (points[:, :2] <= window[1])).all(axis=1)
-    height = heights(cloud.points[seen], findings.seams, X_BS)
-    image, extent = _height_image(points[seen], height)
-    low, high = height_range(height, findings.seams)
-    drawn = axes.imshow(
-        1e3 * image, extent=extent, origin="lower", cmap="cividis", vmin=1e3 * low, vmax=1e3 * high, interpolation="nearest"
-    )
-    bar = figure.colorbar(drawn, ax=axes, orientation="horizontal", fraction=0.035, pad=0.085, aspect=50)
-    bar.set_label("height over the parent surface [mm]", color=INK)
-    bar.outline.set_visible(False)
+    if surface:
+        seen = ((points[:, :2] >= window[0]) & (points[:, :2] <= window[1])).all(axis=1)
+        _surface(figure, axes, points[seen], heights(cloud.points[seen], findings.seams, X_BS), findings)
+    else:
+        axes.set_anchor("N")
     for i, (seam, path) in enumerate(zip(findings.seams, paths, strict=False)):
         for k, side in enumerate(side for side in (seam.left_B, seam.right_B) if side is not None):
             _trace(axes, X_SB, side, LIPS, 1.2, "--", "lips" if i == k == 0 else None)
@@ -128,6 +146,18 @@ def _plan_view(figure: Figure, axes: Axes, cloud: PointCloud, findings: SeamFind
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=10)
     _plain(axes, grid=False)
     axes.set_title("Seen along the surface normal", loc="left", fontsize=13, color=INK)
+
+
+def _surface(figure: Figure, axes: Axes, points: ndarray, height: ndarray, findings: SeamFindings) -> None:
+    """Heights [m] of the points as an image, and what its colours mean."""
+    image, extent = _height_image(points, height)
+    low, high = height_range(height, findings.seams)
+    drawn = axes.imshow(
+        1e3 * image, extent=extent, origin="lower", cmap="cividis", vmin=1e3 * low, vmax=1e3 * high, interpolation="nearest"
+    )
+    bar = figure.colorbar(drawn, ax=axes, orientation="horizontal", fraction=0.035, pad=0.085, aspect=50)
+    bar.set_label("height over the parent surface [mm]", color=INK)
+    bar.outline.set_visible(False)
 
 
 def _window(points_S: ndarray, seams_S: list[ndarray]) -> ndarray:
@@ -180,6 +210,24 @@ def _height_image(points: ndarray, height: ndarray) -> tuple[ndarray, tuple[floa
     image = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape[1], shape[0])
     edge = low + shape * pixel
     return image, (1e3 * low[0], 1e3 * edge[0], 1e3 * low[1], 1e3 * edge[1])
+
+
+def _speed(axes: Axes, log: ExecutionLog | None, path: TorchPath | None, config: ReportConfig) -> None:
+    """Torch speed along the weld, in place of the cross-section of a path file, which has no cloud."""
+    speed = None if log is None or path is None else speed_error(log, path)
+    if speed is None:
+        axes.set_axis_off()
+        return
+    s, planned = 1e3 * speed.s, 1e3 * speed.planned
+    limits = planned * (1 - config.speed), planned * (1 + config.speed)
+    axes.fill_between(s, *limits, color=GOOD, alpha=0.2, lw=0, label=f"planned +-{100 * config.speed:g} %")
+    axes.plot(s, 1e3 * speed.speed, color=LINES["executed"], lw=1.2, label="measured")
+    axes.set_title("Torch speed", loc="left", fontsize=13, color=INK)
+    axes.set_xlabel("along the path [mm]")
+    axes.set_ylabel("torch speed [mm/s]")
+    axes.set_ylim(0, 1.35e3 * max(float(speed.planned.max()), float(speed.speed.max())))
+    axes.legend(frameon=False, fontsize=9, loc="lower left", ncols=2)
+    _plain(axes)
 
 
 def _section(axes: Axes, section: CrossSection) -> None:

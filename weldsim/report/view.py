@@ -14,6 +14,7 @@ from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Reference, Seam
 from weldsim.report.metrics import across, known_offsets, match_seams
 from weldsim.report.tracking import thinned
 
+LINE: Metre = 1e-3  # points nearer together across a seam than this are the seam itself
 MARGIN: Metre = 0.06  # of cloud shown around the seams
 SECTION: Metre = 0.025  # half width of the cross-section shown
 BIN: Metre = 0.5e-3  # of the cross-section
@@ -85,6 +86,11 @@ def cross_section(cloud: PointCloud, seam: Seam, half: Metre = SECTION) -> Cross
         sides = [_local(side, seam.points_B, seam.s, seam) for side in (seam.left_B, seam.right_B)]
         lips = np.array([[a.mean(), h.mean()] for a, h in sides])
     return CrossSection(across=centres, median=median, low=low, high=high, lips=lips, depth=seam.depth)
+
+
+def shows_surface(cloud: PointCloud, seams: tuple[Seam, ...]) -> bool:
+    """Whether a cloud shows more than the seams themselves; that of a path file does not."""
+    return not seams or any(len(across := cross_section(cloud, seam).across) and np.ptp(across) > LINE for seam in seams)
 
 
 def torch_axes(path: TorchPath, every: Metre = 0.01, length: Metre = 0.03) -> Float[ndarray, "m 2 3"]:

@@ -10,12 +10,12 @@ import pytest
 from tests.seams import findings, found_seam, plate_cloud, sine_seam, torch_path, weld_log
 from weldsim.errors import OutputError
 from weldsim.frames import Transform, matrix_from_rotation_vector
-from weldsim.records import Rejection, SeamFindings, Threshold
+from weldsim.records import PointCloud, Rejection, SeamFindings, Threshold
 from weldsim.report import figures
 from weldsim.report.html import write_html
 from weldsim.report.limits import ReportConfig
 from weldsim.report.png import write_png
-from weldsim.report.view import cross_section, error_lines, heights, shown, torch_axes, view_frame
+from weldsim.report.view import cross_section, error_lines, heights, shown, shows_surface, torch_axes, view_frame
 from weldsim.report.weld import weld_report
 
 RNG = np.random.default_rng(7)
@@ -49,6 +49,22 @@ def all_figures() -> dict[str, figures.Figure]:
         "q": figures.joints(LOG, "q", ("a", "b", "c", "d", "e", "f")),
         "qd": figures.joints(LOG, "qd", ("a", "b", "c", "d", "e", "f")),
     }
+
+
+def test_a_path_file_has_no_surface_to_show(tmp_path: Path) -> None:
+    """Its cloud is the seam itself: no height map, no section of one point, and the whole of it in view."""
+    bare = PointCloud(points=SEAM.points_B, frame="B")
+    found = SeamFindings(seams=(SEAM,), region=np.zeros(len(SEAM.points_B), np.int32), method="path file")
+    assert shows_surface(CLOUD, (SEAM,))
+    assert not shows_surface(bare, (SEAM,))
+    drawn = figures.scene(bare, found, (PATH,), LOG, ())
+    assert "cloud" not in [trace["name"] for trace in drawn["data"]]
+    ratio = drawn["layout"]["scene"].get("aspectratio", {"x": 0.0})
+    assert max(ratio.values()) <= figures.LONGEST + 1e-9
+    text = write_html(tmp_path / "r.html", REPORT, bare, found, (PATH,), log=LOG).read_text()
+    assert "<h2>Torch speed</h2>" in text
+    assert "<h2>Mean cross-section</h2>" not in text
+    assert write_png(tmp_path / "r.png", REPORT, bare, found, (PATH,), log=LOG).stat().st_size > 10_000
 
 
 def test_every_figure_is_one_that_plotly_accepts() -> None:
