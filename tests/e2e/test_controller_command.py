@@ -80,9 +80,11 @@ def test_addresses_that_cannot_be_had_are_refused(capsys: pytest.CaptureFixture[
         (["fault", "protectve-stop"], "'protective-stop'"),
         (["status", "stall"], "weldsim controller fault stall"),
         (["fault", "none"], "invalid choice"),
+        (["status", "--set", "path.speed=1"], "--set path.speed=1 changes nothing"),
+        (["--config", "no-such.toml"], "--config no-such.toml changes nothing"),
     ],
 )
-def test_a_fault_is_ordered_by_its_name(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_words_that_order_nothing_are_refused(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["controller", *words]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 
 import tyro
 
-from weldsim.cli.options import ConfigOptions
+from weldsim.cli.options import SCENE_PREFIX, ConfigOptions
 from weldsim.cli.show import print_json
 from weldsim.controller.fault_names import FaultName
 from weldsim.errors import InputError
@@ -64,7 +64,15 @@ class Controller(ConfigOptions):
             raise InputError(f"controller fault: which? one of {', '.join(get_args(FaultName))}")
         if self.action != "fault" and self.fault is not None:
             raise InputError(f"controller {self.action} {self.fault}: weldsim controller fault {self.fault} is meant?")
+        self._refuse_idle_settings()
         return self._serve() if self.action == "serve" else self._ask()
+
+    def _refuse_idle_settings(self) -> None:
+        """Raises InputError for a setting that would change nothing here."""
+        idle = [f"--set {text}" for text in self.set if not (self.scene and text.startswith(SCENE_PREFIX))]
+        idle += [] if self.config is None else [f"--config {self.config}"]
+        if idle:
+            raise InputError(f"controller: {idle[0]} changes nothing here; --set takes scene.KEY=VALUE, together with --scene")
 
     def _serve(self) -> int:
         from weldsim.controller.calibration import Calibration, read_calibration

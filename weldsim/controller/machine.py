@@ -32,9 +32,9 @@ class Machine:
         profile, config: what it is.  arm: what it moves.  kinematics: what it knows of its geometry.
         io: registers and signals.  reference: what the arm follows.
         tool: active TCP and payload.  watchdogs: over input registers.
-        t: time since power-on [s].
+        t: time since power-on [s].  busy: wall-clock time that the last period took [s].
         robot_mode, safety_mode, runtime: states.
-        remote: whether clients may act (e-Series).  popup: text that is shown, or None.
+        remote: whether clients may act (e-Series).  popup: text that is shown, or "".
         loaded: name of the program file that was loaded on the dashboard, or "".
         log: the last messages, each a time and a text.
         history: joint angles of the last periods, the newest last.

@@ -62,8 +62,8 @@ def started_at(trajectory: JointTrajectory, q: Float[ndarray, "6"], blend: Secon
     offset = q - trajectory.q[0]
     if not offset.any():
         return trajectory
-    u = np.clip((trajectory.t - trajectory.t[0]) / min(blend, float(trajectory.t[-1] - trajectory.t[0])), 0.0, 1.0)
     T = min(blend, float(trajectory.t[-1] - trajectory.t[0]))
+    u = np.clip((trajectory.t - trajectory.t[0]) / T, 0.0, 1.0)
     left = 1 - u**3 * (10 - 15 * u + 6 * u**2)
     rate, bend = -30 * u**2 * (1 - u) ** 2 / T, -60 * u * (1 - u) * (1 - 2 * u) / T**2
     return replace(
