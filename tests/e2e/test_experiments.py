@@ -109,3 +109,31 @@ def test_the_budget_is_a_table_of_every_source():
     assert lines[-1] == "| straight | " + " | ".join(f"{0.1 * k:.2f} / -" for k in range(len(names))) + " | 0.05 |"
     one, other = (module.sources(unit)["hand-eye"][1].twin for unit in (0, 1))
     assert not np.allclose(one.X_FC.p, other.X_FC.p)
+
+
+def test_fault_drills_judge_by_the_controllers_own_record() -> None:
+    module = script("23_fault_drills")
+    period, t = 0.008, 0.008 * np.arange(1, 251)
+    text = "the controller hung up (t = 1.000 s)"
+
+    def judged(arc_until: float, **changes: object) -> dict:
+        rows = {"t": t, "arc": (t <= arc_until).astype(float), "speed": np.where(t <= 1.05, 0.1, 0.0)}
+        seen = {"rule": "link", "text": text, "log": (t - t[0]).tolist(), "origin": t[0], "period": period, "last_arc": False}
+        seen |= {"last_speed": 0.0, "events": [(1.0, "link", text)], "disconnect": 0.1, "late": 0}
+        seen["box"] = {"reason": text, "t": seen["log"], "kinds": ["link"], "speed": 0.0, "arc": False}
+        answer = {"struck": [[1.0, "link-drop"]], "log": [], "lost": 0.0}
+        return module.judged(module.CASES["link dropped"], "link dropped", "weld", seen | changes, rows, answer)
+
+    good = judged(1.1)
+    assert good["wrong"] == []
+    assert (good["arc"], good["rest"]) == (pytest.approx(0.096), pytest.approx(0.048))
+    lost = np.delete(t - t[0], 50).tolist()
+    for row, said in (
+        (judged(1.4), "arc after 0.392 s"),
+        (judged(1.1, rule="client"), "reason client"),
+        (judged(1.1, log=lost), "1 periods not in the log"),
+        (judged(1.1, box=None), "no black box"),
+        (judged(1.1, last_arc=True), "log ends with arc True"),
+        (judged(1.1, disconnect=9.0), "disconnect took"),
+    ):
+        assert any(said in line for line in row["wrong"]), (said, row["wrong"])
