@@ -198,14 +198,14 @@ def judged(case: Case, name: str, when: str, seen: dict[str, Any], rows: dict[st
     wrong: list[str] = []
     struck = answer["struck"][0][0] if answer["struck"] else None
     row: dict[str, Any] = {"case": name, "when": when, "rule": seen["rule"], "text": seen.get("text", "")}
+    if struck is None and case.acts:
+        wrong.append("was not struck")
     if struck is not None and not (when == "connect" and seen["rule"] is None):  # or it was over before the arm moved
         for key, mask in (("arc", rows["arc"] > 0), ("rest", rows["speed"] > AT_REST)):
             late = rows["t"][mask & (rows["t"] >= struck)]
             row[key] = float(late[-1] - struck) if len(late) else 0.0
             if row[key] > case.limit:
                 wrong.append(f"{key} after {row[key]:.3f} s (limit {case.limit:g} s)")
-    elif case.acts:
-        wrong.append("was not struck")
     if case.owner == "dead":
         if seen["rule"] != "DEAD":
             wrong.append(f"the owner lives: {seen['rule']}")
