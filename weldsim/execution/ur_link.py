@@ -20,7 +20,7 @@ from weldsim.execution.ur_stream import Sample, StateStream
 READY = 1  # output_int_register_0 while ur_rtde's script waits for a command
 HANDED_BACK = 1.0  # [s] in which a client that has just gone must have given back what it commanded by
 ON_ITS_WAY = 3  # states that a network may hold
-PROOF = 0.1  # [s] in which a state comes where the controller lives
+PROOF = 0.2  # [s] in which the states show what is wrong
 READ_BACK = 1e-6  # [m], [rad], [kg] that a setting may differ by when read back
 
 
@@ -156,10 +156,11 @@ def _meanwhile(config: UrConfig, stream: StateStream | None) -> Trouble | None:
     """What has come into the way of a connection that was being made: the library does not say. None where nothing is found."""
     if stream is None:
         return None
+    end = time.monotonic() + PROOF
     try:
-        samples = stream.take_all() if stream.wait(PROOF) else []
-        if samples and (trouble := safety_trouble(samples[-1])):
-            return trouble
+        while (left := end - time.monotonic()) > 0 and stream.wait(left):  # what waits already may be older than the trouble
+            if trouble := safety_trouble(stream.take()):
+                return trouble
         with Dashboard(config.host, PROOF) as dashboard:
             return LOCAL if dashboard.remote_control() is False else foreign_trouble(dashboard.ask("programState"))
     except LinkError:
