@@ -92,7 +92,7 @@ def signals(io: Any, receive: Any) -> dict[str, Any]:
     io.setSpeedSlider(0.5)
     time.sleep(PAUSE)
     seen["analog"] = receive.getStandardAnalogOutput0(), receive.getStandardAnalogOutput1()
-    seen["slider"] = receive.getSpeedScaling()
+    seen["slider"] = receive.getSpeedScalingCombined()
     io.setSpeedSlider(1.0)
     return seen
 

@@ -167,7 +167,6 @@ def refusals(control: Any, receive: Any) -> dict[str, Any]:
         "moveJ": lambda: control.moveJ([7.0, *q[1:]]),
         "moveL": lambda: control.moveL([3.0, 0, 0, 0, 0, 0]),
         "moveJ_IK": lambda: control.moveJ_IK([3.0, 0, 0, 0, 0, 0]),
-        "forceMode": lambda: control.forceMode([0.0] * 6, [0, 0, 1, 0, 0, 0], [0.0] * 6, 2, [0.1] * 6),
         "ik": lambda: control.getInverseKinematics([3.0, 0, 0, 0, 0, 0]),
     }
     for name, ask in asked.items():
@@ -176,12 +175,8 @@ def refusals(control: Any, receive: Any) -> dict[str, Any]:
         took = time.monotonic() - began
         time.sleep(PAUSE)
         ended = not control.isProgramRunning()
-        for _ in range(2):  # a command of the streaming kind stays in its register, and the script stumbles over it once more
-            control.reuploadScript()
-            time.sleep(0.4)
-            if control.isProgramRunning():
-                break
-            control.stopJ()  # its hand-shake clears the register
+        control.reuploadScript()
+        time.sleep(0.4)
         seen[name] = {"answer": answer, "took": took, "ended": ended, "again": control.moveJ(receive.getActualQ())}
     return {"refused": seen, "has_ik": control.getInverseKinematicsHasSolution([3.0, 0, 0, 0, 0, 0])}
 

@@ -28,6 +28,11 @@ DH = np.array(
     ]
 )
 """The same arm as its controller tells it: theta offset [rad], a [m], d [m], alpha [rad] of each joint, in standard DH."""
+TURNS = np.array([0.3456, 0.0, 0.0, 0.0, 0.0, 0.2345])  # [rad] arbitrary, but no round angles: see `inverse_of_many`
+TURN_FIRST, TURN_LAST = (
+    np.array([[np.cos(a), -np.sin(a), 0, 0], [np.sin(a), np.cos(a), 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    for a in (TURNS[0], TURNS[5])
+)
 JOINT_LIMIT = 2 * np.pi  # [rad] each joint, both ways
 SPEED_LIMIT = np.pi  # [rad/s] each joint
 REACH = 0.85  # [m] published; beyond it a flange pose has no solution
@@ -93,12 +98,19 @@ def inverse(X_BF: Transform) -> Float[ndarray, "k 6"]:
 
 
 def inverse_of_many(X_BF: Float[ndarray, "n 4 4"]) -> tuple[Float[ndarray, "n_k 6"], Int[ndarray, "n_k"]]:
-    """All joint solutions [rad] in (-pi, pi] of many flange poses, and the pose that each is of."""
+    """All joint solutions [rad] in (-pi, pi] of many flange poses, and the pose that each is of.
+
+    ur-analytic-ik loses solutions where the angles of a pose are round: all with the tool square to the arm and the last joint at
+    zero, which is how a tool points straight down. So it is asked for poses turned about the first and the last joint's axis.
+    """
     import ur_analytic_ik
 
     solve = ur_analytic_ik.ur5.inverse_kinematics  # pyright: ignore[reportAttributeAccessIssue] - compiled, untyped
-    found = [(solution, i) for i, matrix in enumerate(X_BF) for solution in solve(matrix)]
-    return np.array([q for q, _ in found], float).reshape(-1, 6), np.array([i for _, i in found], np.int64)
+    turned = TURN_FIRST @ X_BF @ TURN_LAST
+    found = [(solution, i) for i, matrix in enumerate(turned) for solution in solve(matrix)]
+    q = np.array([q for q, _ in found], float).reshape(-1, 6) - TURNS
+    q -= 2 * np.pi * np.ceil(q / (2 * np.pi) - 0.5)
+    return q, np.array([i for _, i in found], np.int64)
 
 
 def inverse_near(X_BF: Transform, q_near: Float[ndarray, "6"]) -> Float[ndarray, "6"]:

@@ -34,7 +34,8 @@ class Controller(ConfigOptions):
     """CB3 3.15 at 125 Hz or e-Series 5.11 at 500 Hz."""
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE")] = ""
-    """What stands on the table, a name or a TOML file; nothing by default. A collision is a protective stop."""
+    """What stands on the table, a name or a TOML file. A collision is a protective stop. By default the arm is alone: no table, no
+    torch."""
 
     calibration: Path | None = None
     """Factory calibration of the arm, a controller's calibration.conf: what the arm tells of itself on port 30001, and how poses

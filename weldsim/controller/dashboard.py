@@ -7,6 +7,7 @@ from weldsim.execution.ur_modes import RobotMode, RuntimeState
 
 BANNER = b"Connected: Universal Robots Dashboard Server\n"
 MAX_LINE = 65536
+ROLES = ("programmer", "operator", "none", "locked", "restricted")
 LOCAL = "Command is not allowed due to safety reasons."  # what an e-Series in local control says
 _LOCAL_TOO = frozenset(
     [
@@ -127,6 +128,8 @@ class Dashboard:
         return "Added log message"
 
     def _set_role(self, role: str) -> str:
+        if role.lower() not in ROLES:
+            return f"Failed setting user role: {role}"
         self._role = role.upper()
         return f"Setting user role: {self._role}"
 

@@ -30,7 +30,8 @@ _BANKS: dict[str, tuple[str, int, int]] = {
     "int": ("INT32", 0, INTEGERS),
     "double": ("DOUBLE", 0, DOUBLES),
 }
-_SHIFT = {"standard_digital_output": 0, "configurable_digital_output": 8, "tool_digital_output": 16}
+_DIGITAL = {"standard_digital_output": (0, 0xFF), "configurable_digital_output": (8, 0xFF), "tool_digital_output": (16, 0b11)}
+"""First bit of each group of outputs, and which of the bits of its mask there are."""
 
 
 def input_type(name: str) -> str | None:
@@ -64,9 +65,9 @@ class InputRecipe:
             elif name.startswith("input_bit_registers"):
                 first = 0 if name.endswith("31") else 32
                 io.in_bit[first : first + 32] = [bool(value >> k & 1) for k in range(32)]
-        for name, shift in _SHIFT.items():
+        for name, (shift, there) in _DIGITAL.items():
             if name in values:
-                io.mask_digital_out(shift, values.get(f"{name}_mask", 0), values[name])
+                io.mask_digital_out(shift, values.get(f"{name}_mask", 0) & there, values[name])
         if values.get("speed_slider_mask", 0):
             io.slider = min(1.0, max(0.0, values.get("speed_slider_fraction", io.slider)))
         _apply_analog(values, io)

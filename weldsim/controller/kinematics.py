@@ -6,14 +6,12 @@ Joint angles and poses are plain lists, as programs and RTDE have them.
 from collections.abc import Sequence
 
 import numpy as np
-import ur_analytic_ik
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.kinematics import DH, JOINT_LIMIT, dh_frames
+from weldsim.kinematics import DH, JOINT_LIMIT, dh_frames, inverse_of_many
 from weldsim.urscript.poses import Matrix, inverse_matrix, matrix_of, pose_of
 
-_IK = ur_analytic_ik.ur5.inverse_kinematics  # pyright: ignore[reportAttributeAccessIssue] - compiled, untyped
 ROUNDS = 10  # of refining a solution; each squares its error, and the first is some millimetres
 EXACT = 1e-10  # [m], [rad]
 
@@ -40,11 +38,8 @@ class Kinematics:
     def joints_near(self, matrix: Matrix, tcp: Matrix, near: Sequence[float]) -> list[float] | None:
         """Joint angles [rad] that put the TCP at X_BT = matrix, the solution nearest to `near` within limits; None without any."""
         flange = matrix @ inverse_matrix(tcp)
-        solutions = _IK(flange)
-        if len(solutions) == 0:
-            return None
-        q = np.array([np.asarray(solution, float).reshape(6) for solution in solutions])
-        if not np.isfinite(q).all():
+        q, _ = inverse_of_many(flange[None])
+        if len(q) == 0 or not np.isfinite(q).all():
             return None
         start = np.asarray(near, float)
         turned = q + 2 * np.pi * np.round((start - q) / (2 * np.pi))

@@ -22,6 +22,7 @@ from weldsim.urscript.poses import matrix_of
 from weldsim.urscript.program import Program
 
 LOG_LINES = 500
+PACE_RATE = 4.0  # [1/s] of the speed slider's effect; no published figure, but no arm changes its speed in one period
 WAITING = "def loaded_program():\n  while True:\n    sync()\n  end\nend\n"  # what a program file does that is played
 
 
@@ -38,6 +39,9 @@ class Machine:
         loaded: name of the program file that was loaded on the dashboard, or "".
         log: the last messages, each a time and a text.
         history: joint angles of the last periods, the newest last.
+        pace: share of the programmed speed at which moves go on; it follows the speed slider.
+        limiter: what a move is slowed down by for its joints' sake, 1 where it need not be.
+        waypoint: pose at which the move under way will end, or None without one.
     """
 
     def __init__(self, profile: Profile, arm: Arm, config: ControllerConfig | None = None) -> None:
@@ -46,6 +50,8 @@ class Machine:
         self.kinematics = Kinematics(self.config.calibration.dh)
         self.reference = Reference(arm.q, profile.period, self.kinematics)
         self.t, self.busy = 0.0, 0.0
+        self.pace, self.limiter = self.io.slider, 1.0
+        self.waypoint: list[float] | None = None
         self.robot_mode, self.safety_mode, self.runtime = RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.STOPPED
         self.remote, self.popup, self.loaded = True, "", ""
         self.log: deque[tuple[float, str]] = deque(maxlen=LOG_LINES)
@@ -87,6 +93,7 @@ class Machine:
     def tick(self) -> None:
         """One control period."""
         self._snapshot = None
+        self.pace += min(PACE_RATE * self.profile.period, max(-PACE_RATE * self.profile.period, self.io.slider - self.pace))
         self.reference.commanded = False
         if self.runtime is RuntimeState.PLAYING and self.can_move:
             self._run_program()

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 Getter = Callable[["Snapshot"], Any]
 """A number, or a sequence where the type is a vector."""
 
-ZERO6, ZERO3 = (0.0,) * 6, (0.0,) * 3
-JOINT_RUNNING = 253  # joint_mode of a joint under control
+ZERO6 = (0.0,) * 6
 
 _FIXED: dict[str, tuple[str, Getter]] = {
     "timestamp": ("DOUBLE", lambda s: s.t),
@@ -39,22 +38,22 @@ _FIXED: dict[str, tuple[str, Getter]] = {
     "joint_temperatures": ("VECTOR6D", lambda s: (30.0,) * 6),
     "actual_execution_time": ("DOUBLE", lambda s: s.busy),
     "robot_mode": ("INT32", lambda s: s.robot_mode),
-    "joint_mode": ("VECTOR6INT32", lambda s: (JOINT_RUNNING,) * 6),
+    "joint_mode": ("VECTOR6INT32", lambda s: (s.joint_mode,) * 6),
     "safety_mode": ("INT32", lambda s: s.safety_mode),
     "safety_status": ("INT32", lambda s: s.safety_mode),
-    "actual_tool_accelerometer": ("VECTOR3D", lambda s: ZERO3),
+    "actual_tool_accelerometer": ("VECTOR3D", lambda s: s.tool_acceleration),
     "speed_scaling": ("DOUBLE", lambda s: s.speed_scaling),
     "target_speed_fraction": ("DOUBLE", lambda s: s.io.slider),
     "actual_momentum": ("DOUBLE", lambda s: 0.0),
     "tcp_force_scalar": ("DOUBLE", lambda s: 0.0),
     "actual_main_voltage": ("DOUBLE", lambda s: 48.0),
-    "actual_robot_voltage": ("DOUBLE", lambda s: 48.0),
-    "actual_robot_current": ("DOUBLE", lambda s: 0.5),
-    "actual_joint_voltage": ("VECTOR6D", lambda s: (48.0,) * 6),
+    "actual_robot_voltage": ("DOUBLE", lambda s: s.voltage),
+    "actual_robot_current": ("DOUBLE", lambda s: 0.5 if s.voltage else 0.0),
+    "actual_joint_voltage": ("VECTOR6D", lambda s: (s.voltage,) * 6),
     "actual_digital_output_bits": ("UINT64", lambda s: s.io.digital_out),
     "runtime_state": ("UINT32", lambda s: s.runtime_state),
     "elbow_position": ("VECTOR3D", lambda s: s.elbow),
-    "elbow_velocity": ("VECTOR3D", lambda s: ZERO3),
+    "elbow_velocity": ("VECTOR3D", lambda s: s.elbow_speed),
     "robot_status_bits": ("UINT32", lambda s: s.status_bits),
     "safety_status_bits": ("UINT32", lambda s: s.safety_bits),
     "analog_io_types": ("UINT32", lambda s: s.io.analog_in_domain | s.io.analog_out_domain << 2),
@@ -63,7 +62,7 @@ _FIXED: dict[str, tuple[str, Getter]] = {
     "standard_analog_output0": ("DOUBLE", lambda s: s.io.analog_out[0]),
     "standard_analog_output1": ("DOUBLE", lambda s: s.io.analog_out[1]),
     "io_current": ("DOUBLE", lambda s: 0.0),
-    "tool_mode": ("UINT32", lambda s: JOINT_RUNNING),
+    "tool_mode": ("UINT32", lambda s: s.joint_mode),
     "tool_analog_input_types": ("UINT32", lambda s: 3),
     "tool_analog_input0": ("DOUBLE", lambda s: 0.0),
     "tool_analog_input1": ("DOUBLE", lambda s: 0.0),

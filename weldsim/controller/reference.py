@@ -8,7 +8,7 @@ from math import exp
 
 import numpy as np
 
-from weldsim.controller.errors import MotionFault
+from weldsim.controller.errors import MotionFault, TooFast
 from weldsim.controller.kinematics import Kinematics
 from weldsim.kinematics import JOINT_LIMIT, SPEED_LIMIT
 from weldsim.urscript.poses import Matrix
@@ -43,14 +43,15 @@ class Reference:
         """This period ends at q, at speed qd or else at the mean speed of the period.
 
         Raises:
-            MotionFault: a joint would leave its range or be faster than it can.
+            TooFast: a joint would be faster than it can.
+            MotionFault: a joint would leave its range.
         """
         h = self.period
         mean = [(new - old) / h for new, old in zip(q, self.q, strict=True)]
         speeds = mean if qd is None else list(qd)
         for joint in range(6):
             if abs(mean[joint]) > SPEED_LIMIT * SPEED_MARGIN:
-                raise MotionFault(f"joint {joint} would turn at {mean[joint]:.2f} rad/s, the limit is {SPEED_LIMIT:.2f} rad/s")
+                raise TooFast(f"joint {joint} would turn at {mean[joint]:.2f} rad/s, the limit is {SPEED_LIMIT:.2f} rad/s")
             if abs(q[joint]) > JOINT_LIMIT:
                 raise MotionFault(f"joint {joint} would turn to {q[joint]:.3f} rad, beyond its range of {JOINT_LIMIT:.3f} rad")
         self.qdd = [(new - old) / h for new, old in zip(speeds, self.qd, strict=True)]

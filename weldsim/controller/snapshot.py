@@ -4,6 +4,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from weldsim.execution.ur_modes import RobotMode, RuntimeState, safety_bits
 from weldsim.kinematics import link_frames
@@ -11,6 +13,11 @@ from weldsim.kinematics import link_frames
 if TYPE_CHECKING:
     from weldsim.controller.machine import Machine
 
+JOINT_POWER_OFF = 239
+JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.BACKDRIVE: 238, RobotMode.IDLE: 255, RobotMode.POWER_ON: 255}  # UR RTDE guide
+BUS_VOLTAGE = 48.0  # [V]
+STANDARD_GRAVITY = 9.80665  # [m/s2]
+Frames = Float[ndarray, "6 4 4"]
 TORQUE_CONSTANT = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)  # [Nm/A] order of magnitude, behind the gear; no published figure
 
 
@@ -22,13 +29,16 @@ class Snapshot:
         q, qd: measured [rad, rad/s].  q_target, qd_target, qdd_target: the reference.  torque [Nm].
         io: registers and signals.  tcp_offset: active TCP.  payload [kg], payload_cog [m], payload_inertia [kg m2].
         robot_mode, safety_mode, runtime_state, status_bits, safety_bits: as the RTDE guide numbers them.
-        speed_scaling: share of the programmed speed.
+        joint_mode: of every joint.  voltage: of arm and joints [V].
+        speed_scaling: what the controller itself slows its moves down by; times the slider it is the share of the programmed speed.
     """
 
     def __init__(self, machine: "Machine") -> None:
         arm, reference, tool = machine.arm, machine.reference, machine.tool
         self.t, self.busy, self.io = machine.t, machine.busy, machine.io
-        self.q, self.qd, self.torque = arm.q, arm.qd, arm.torque
+        running = machine.robot_mode is RobotMode.RUNNING
+        self.q, self.qd = arm.q, arm.qd
+        self.torque = arm.torque if running else [0.0] * 6  # otherwise the brakes hold the arm
         self.q_target, self.qd_target, self.qdd_target = reference.q, reference.qd, reference.qdd
         self._tcp, self._kinematics = tool.tcp_matrix, machine.kinematics
         self.tcp_offset, self.payload = tool.tcp, tool.payload
@@ -38,7 +48,9 @@ class Snapshot:
         playing = machine.runtime is RuntimeState.PLAYING
         powered = machine.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
         self.status_bits = int(powered) | int(playing) << 1 | 1 << 3
-        self.speed_scaling = machine.io.slider if machine.can_move else 0.0
+        self.joint_mode = JOINT_MODES.get(machine.robot_mode, JOINT_POWER_OFF)
+        self.voltage = BUS_VOLTAGE if powered else 0.0
+        self.speed_scaling = machine.limiter if machine.can_move else 0.0
 
     @cached_property
     def current(self) -> list[float]:
@@ -63,4 +75,20 @@ class Snapshot:
 
     @cached_property
     def elbow(self) -> list[float]:
-        return link_frames(np.array(self.q))[2, :3, 3].tolist()
+        return self._frames[2, :3, 3].tolist()
+
+    @cached_property
+    def elbow_speed(self) -> list[float]:
+        """Velocity of the elbow [m/s] in the base."""
+        elbow = self._frames[2, :3, 3]
+        # Only the two joints before it move it; every joint turns about its frame's z.
+        return sum(qd * np.cross(X[:3, 2], elbow - X[:3, 3]) for qd, X in zip(self.qd[:2], self._frames, strict=False)).tolist()
+
+    @cached_property
+    def tool_acceleration(self) -> list[float]:
+        """What an accelerometer in the flange feels of gravity [m/s2]; what it would feel of the motion is left out."""
+        return (STANDARD_GRAVITY * self._frames[5, 2, :3]).tolist()
+
+    @cached_property
+    def _frames(self) -> Frames:
+        return link_frames(np.array(self.q))

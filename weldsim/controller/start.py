@@ -5,10 +5,9 @@ from weldsim.controller.config import ControllerConfig
 from weldsim.controller.machine import Machine
 from weldsim.controller.profile import PROFILES, Series
 from weldsim.controller.server import Server
-from weldsim.scene.cell import new_cell
-from weldsim.scene.config import MaterialConfig, SceneConfig
+from weldsim.scene.cell import new_arm
+from weldsim.scene.config import SceneConfig
 from weldsim.scene.quiet import keep_quiet
-from weldsim.scene.tool import add_tool
 from weldsim.scene.world import HOME, build_world
 
 
@@ -16,15 +15,16 @@ def new_machine(series: Series = "cb3", scene: SceneConfig | None = None, config
     """A controller at rest, powered and with its brakes released; its arm waits where a dry run of the scene has it, else at HOME.
 
     Args:
-        series: which profile.  scene: what stands on the table, nothing where None.  config: how it behaves.
+        series: which profile.  config: how it behaves.
+        scene: what stands on the table; where None the arm is alone, without table and torch, and can do whatever a UR5 can.
     """
     if scene is not None:
         world = build_world(scene)
         model, q = world.model, world.start_joints()
     else:
         keep_quiet()
-        spec = new_cell(MaterialConfig())
-        add_tool(spec.body("wrist_3_link"))
+        spec = new_arm()
+        spec.body("wrist_3_link").add_site(name="torch_tip")
         model, q = spec.compile(), HOME
     profile = PROFILES[series]
     return Machine(profile, Arm(model, q.tolist(), profile), config)

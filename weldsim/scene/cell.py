@@ -32,8 +32,8 @@ MATERIALS: dict[str, tuple[tuple[float, float, float], float, float]] = {
 }
 
 
-def new_cell(material: MaterialConfig) -> Spec:
-    """A model of the room with the bare arm on its table, expressed in W: everything but tool and part."""
+def new_arm() -> Spec:
+    """A model of the arm alone, expressed in W: nothing under it, about it or on its flange."""
     # The arm's file is the root rather than attached: attaching without a prefix to its names is warned about.
     spec = mujoco.MjSpec.from_file(str(asset_path("ur5", "ur5.xml")))
     spec.modelname = "weldsim"
@@ -41,6 +41,12 @@ def new_cell(material: MaterialConfig) -> Spec:
     base.pos, base.quat = X_WB.p, X_WB.quaternion
     spec.option.timestep = 0.002
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    return spec
+
+
+def new_cell(material: MaterialConfig) -> Spec:
+    """A model of the room with the bare arm on its table, expressed in W: everything but tool and part."""
+    spec = new_arm()
     spec.stat.center, spec.stat.extent = [0.0, 0.3, 0.9], 1.6
     spec.visual.map.znear, spec.visual.map.zfar = 0.005, 30.0
     visual = spec.visual.global_

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Generator
 from math import hypot
-from typing import Any
+from typing import Any, TypeVar
 
-from weldsim.controller.errors import MotionFault
+from weldsim.controller.errors import MotionFault, TooFast
 from weldsim.controller.machine import Machine
 from weldsim.controller.reference import STOP_DECELERATION
 from weldsim.controller.trapezoid import Trapezoid
@@ -16,10 +16,12 @@ from weldsim.urscript.values import number
 
 Motion = Generator[None, None, None]
 Step = Callable[[], object]
+T = TypeVar("T")
 TURN_RADIUS = 0.25  # [m] a turn of one radian of the tool counts as this long a way
 MAX_ACCELERATION = 40.0  # [rad/s2] or [m/s2]
 LOOKAHEAD, GAIN = (0.03, 0.2), (100.0, 2000.0)  # ranges of servoj
 LEAST_TIME = 1e-9  # [s]
+LIMITER_STEP, LEAST_LIMITER = 0.9, 0.02  # how finely a path too fast for a joint is slowed down, and how far before it is a fault
 ARRIVED, ARRIVAL_TIME = 5e-5, 0.1  # [rad] a move ends when every joint is this near to its target, or this much [s] later
 
 
@@ -37,6 +39,10 @@ class MotionFunctions:
         """Joints to q, or to the joints of a pose, all arriving together; a [rad/s2], v [rad/s], t [s] instead of v."""
         target = self._within(self._joints(q))
         a, v = min(positive(a, "a"), MAX_ACCELERATION), min(positive(v, "v"), SPEED_LIMIT)
+        yield from self._towards(self._machine.kinematics.tcp_pose(target, self._tcp), self._turn(target, a, v, t))
+
+    def _turn(self, target: list[float], a: float, v: float, t: float) -> Motion:
+        """Joints to target [rad], planned anew after whatever held them."""
         while True:
             yield from self._settle()
             start = self._reference.q
@@ -49,7 +55,7 @@ class MotionFunctions:
             ) -> None:
                 s, speed = p.at(elapsed)
                 share, rate = (s / length, speed / length) if length > 0 else (1.0, 0.0)
-                rate *= self._machine.io.slider
+                rate *= self._machine.pace
                 self._reference.move([q0 + share * x for q0, x in zip(start, way, strict=True)], [rate * x for x in way])
 
             if (yield from self._along(at, profile.duration)):
@@ -60,6 +66,10 @@ class MotionFunctions:
         target = self._pose(pose)
         a, v = min(positive(a, "a"), MAX_ACCELERATION), positive(v, "v")
         self._joints_of(target)
+        yield from self._towards(target, self._line(target, a, v, t))
+
+    def _line(self, target: list[float], a: float, v: float, t: float) -> Motion:
+        """TCP to the pose target, planned anew after whatever held it."""
         while True:
             yield from self._settle()
             start = self._machine.kinematics.tcp_pose(self._reference.q, self._tcp)
@@ -79,10 +89,8 @@ class MotionFunctions:
         """As movel."""
         yield from self.movel(pose, a, v)
 
-    def servoj(
-        self, q: Any, a: float = 0, v: float = 0, t: float = 0.008, lookahead_time: float = 0.1, gain: float = 300
-    ) -> Motion:
-        """Follow q [rad] for t [s], `lookahead_time` late; a and v are not used, as on a real controller."""
+    def servoj(self, q: Any, a: float = 0, v: float = 0, t: float = 0, lookahead_time: float = 0.1, gain: float = 300) -> Motion:
+        """Follow q [rad] for t [s], or for one period, `lookahead_time` late; a and v are not used, as on a real controller."""
         target = six(q, "servoj q")
         for name, value, (low, high) in (("lookahead_time", lookahead_time, LOOKAHEAD), ("gain", gain, GAIN)):
             if not low <= number(value) <= high:
@@ -168,15 +176,15 @@ class MotionFunctions:
     def _profile(self, length: float, v: float, a: float, t: float) -> Trapezoid:
         return Trapezoid.lasting(length, t, a) if number(t) > 0 and length > 0 else Trapezoid(length, v, a)
 
-    def _command(self, step: Step) -> bool:
-        """What `step` returns after it has commanded this period; a fault stops the arm and counts as not done."""
+    def _command(self, step: Callable[[], T]) -> T | None:
+        """What `step` returns after it has commanded this period; a fault stops the arm and counts as not done: None."""
         if self._reference.commanded:
             raise ScriptError("another thread is already moving the arm")
         try:
-            return bool(step())
+            return step()
         except MotionFault as fault:
             self._machine.protective_stop(str(fault))
-            return False
+            return None
 
     def _for(self, t: float, step: Step) -> Motion:
         """`step` every period for t [s], one period at least."""
@@ -188,8 +196,16 @@ class MotionFunctions:
         """`step` every period until it says that it is done."""
         done = False
         while not done:
-            done = self._command(step)
+            done = bool(self._command(step))
             yield
+
+    def _towards(self, pose: list[float], motion: Motion) -> Motion:
+        """A motion, during which `pose` is what the controller calls its waypoint."""
+        self._machine.waypoint = pose
+        try:
+            yield from motion
+        finally:  # whether it has arrived or its thread was killed
+            self._machine.waypoint, self._machine.limiter = None, 1.0
 
     def _settle(self) -> Motion:
         """Rest, before a move that begins from rest."""
@@ -198,15 +214,32 @@ class MotionFunctions:
             yield
 
     def _along(self, at: Callable[[float], None], duration: float) -> Generator[None, None, bool]:
-        """`at(elapsed)` every period up to `duration`; whether it got there, or was held and must be planned anew."""
+        """`at(elapsed)` every period up to `duration`; whether it got there, or was held and must be planned anew.
+
+        Where a joint would be too fast it is slowed down as far as it takes: UR's trajectory limiter, reported as speed_scaling.
+        """
         elapsed, before = 0.0, self._reference.q
         if duration < LEAST_TIME:  # there already: a move takes one period all the same
             yield
         while elapsed < duration - LEAST_TIME:
             if self._reference.q is not before:
                 return False  # something else moved the reference: a pause, a protective stop
-            elapsed = min(duration, elapsed + self._reference.period * self._machine.io.slider)
-            self._command(lambda: at(elapsed))  # noqa: B023 - called at once
+            done, step = elapsed, self._reference.period * self._machine.pace
+
+            def limited(done: float = done, step: float = step) -> float:
+                limiter = self._machine.limiter = min(1.0, self._machine.limiter / LIMITER_STEP)
+                while True:
+                    now = min(duration, done + limiter * step)
+                    try:
+                        at(now)
+                    except TooFast:
+                        if limiter < LEAST_LIMITER:
+                            raise
+                        limiter = self._machine.limiter = limiter * LIMITER_STEP
+                    else:
+                        return now
+
+            elapsed = self._command(limited) or elapsed
             before = self._reference.q
             yield
         for _ in range(round(ARRIVAL_TIME / self._reference.period)):

@@ -8,10 +8,11 @@ from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.values import Pose, number
 
 MAX_PAYLOAD = 10.0  # [kg] what a UR5 accepts is less, its newer firmware more; beyond this it is a mistake of units
+FORCE_TYPES = (1, 2, 3)  # how the force frame is transformed: to the TCP, not at all, to the TCP's motion
 
 
 class RobotFunctions:
-    """State, TCP and payload. Force control is not modelled and refuses; switching it off, or setting it up, does nothing."""
+    """State, TCP and payload. Force control is not modelled: it is accepted, checked, and the arm stays where it is."""
 
     def __init__(self, machine: Machine) -> None:
         self._machine = machine
@@ -46,7 +47,9 @@ class RobotFunctions:
         return Pose(self._machine.kinematics.tcp_pose(self._machine.reference.q, self._machine.tool.tcp_matrix))
 
     def get_target_waypoint(self) -> Pose:
-        return self.get_target_tcp_pose()
+        """Where the move that is under way will end; the target pose of now without one."""
+        waypoint = self._machine.waypoint
+        return self.get_target_tcp_pose() if waypoint is None else Pose(waypoint)
 
     def get_actual_tcp_speed(self) -> list[float]:
         return list(self._machine.snapshot.tcp_speed)
@@ -110,8 +113,16 @@ class RobotFunctions:
         """Accepted; the simulated arm stands upright."""
 
     def force_mode(self, task_frame: Any, selection_vector: Any, wrench: Any, type: int, limits: Any) -> None:
-        """Refused."""
-        raise ScriptError("force_mode is not modelled by the virtual controller")
+        """Nothing, after the arguments have been checked: nothing pushes the arm and it pushes nothing."""
+        for value, name in (
+            (task_frame, "task_frame"),
+            (selection_vector, "selection_vector"),
+            (wrench, "wrench"),
+            (limits, "limits"),
+        ):
+            six(value, f"force_mode {name}")
+        if number(type) not in FORCE_TYPES:
+            raise ScriptError(f"force_mode: type = {type} is none of 1, 2, 3")
 
     def end_force_mode(self) -> None:
         """Nothing: there is no force mode."""
