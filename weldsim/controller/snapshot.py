@@ -82,7 +82,8 @@ class Snapshot:
         """Velocity of the elbow [m/s] in the base."""
         elbow = self._frames[2, :3, 3]
         # Only the two joints before it move it; every joint turns about its frame's z.
-        return sum(qd * np.cross(X[:3, 2], elbow - X[:3, 3]) for qd, X in zip(self.qd[:2], self._frames, strict=False)).tolist()
+        before = self._frames[:2]
+        return (self.qd[:2] @ np.cross(before[:, :3, 2], elbow - before[:, :3, 3])).tolist()
 
     @cached_property
     def tool_acceleration(self) -> list[float]:
