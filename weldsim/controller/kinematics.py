@@ -26,6 +26,7 @@ class Kinematics:
     def __init__(self, dh: Float[ndarray, "6 4"] = DH) -> None:
         self.dh = dh
         self._nominal = bool((dh == DH).all())
+        inverse_of_many(np.eye(4)[None])  # its library is loaded now, not in a control period
 
     def tcp_matrix(self, q: Sequence[float], tcp: Matrix) -> Matrix:
         """X_BT for joint angles q [rad] and X_FT = tcp."""
