@@ -77,7 +77,12 @@ def reach_map(
 
 
 def _weldable(path: TorchPath, move: Float[ndarray, "3"], cell: Cell, config: MotionConfig) -> bool:
+    from weldsim.scene.world import AWAY, HOME
+
     there = cell.moved(move)
+    # Where it stands now, or where a scene has it wait otherwise: one must be clear, or no job can begin.
+    if all(there.collision.touches(np.asarray(q, float)) for q in (cell.q_start, HOME, AWAY)):
+        return False
     moved = TorchPath(
         X_BT=shifted(path.X_BT, move),
         s=path.s,

@@ -1,19 +1,21 @@
 """The exported program is read back by the dry run, passes, and takes the torch along the path."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from tests.torch_paths import START, flat_curve, torch_path
 from weldsim.curves import project
-from weldsim.dryrun.cell import empty_cell
+from weldsim.dryrun.cell import empty_cell, scene_cell, shifted
 from weldsim.dryrun.reach import reach_map
 from weldsim.dryrun.read import read_program
-from weldsim.dryrun.try_path import try_path
+from weldsim.dryrun.try_path import quick, try_path
 from weldsim.dryrun.try_script import try_script
 from weldsim.execution.urscript import script_text
 from weldsim.kinematics import torch_pose
 from weldsim.motion.config import MotionConfig
+from weldsim.scene.config import SceneConfig
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -64,3 +66,15 @@ def test_the_reach_map_is_what_the_arm_can_do():
     assert near.any()
     assert not found.good[near].any()
     assert 0.2 < found.share < 0.98
+
+
+def test_a_place_at_which_the_part_stands_in_the_arm_will_not_do():
+    """Its seam could be welded there, but the arm would have nowhere to begin."""
+    cell = scene_cell(SceneConfig()).moved(np.array([0.15, 0.0, 0.0]))
+    path = torch_path(flat_curve("line", 0.05) + np.array([0.15, -0.45, 0.03]), DOWN)
+    move = np.array([0.0, 0.25, 0.0])
+    assert quick(replace(path, X_BT=shifted(path.X_BT, move)), cell.moved(move), MotionConfig())
+    found = reach_map(path, cell, pitch=0.25)
+    i, j = int(np.abs(found.y - (found.now[1] + 0.25)).argmin()), int(np.abs(found.x - found.now[0]).argmin())
+    assert not found.good[i, j]
+    assert found.good.any()
