@@ -197,10 +197,12 @@ def judged(case: Case, name: str, when: str, seen: dict[str, Any], rows: dict[st
     """Times of one strike, and what is wrong about it."""
     wrong: list[str] = []
     struck = answer["struck"][0][0] if answer["struck"] else None
-    row: dict[str, Any] = {"case": name, "when": when, "rule": seen["rule"], "text": seen.get("text", "")}
+    reason = seen.get("text", "").split("; black box")[0]  # whose path is this machine's own
+    row: dict[str, Any] = {"case": name, "when": when, "rule": seen["rule"], "text": reason}
     if struck is None and case.acts:
         wrong.append("was not struck")
-    if struck is not None and not (when == "connect" and seen["rule"] is None):  # or it was over before the arm moved
+    # A fault may be over before the arm moves: then there is nothing to be measured.
+    if struck is not None and (when != "connect" or seen["rule"] in set(case.rules) - {None}):
         for key, mask in (("arc", rows["arc"] > 0), ("rest", rows["speed"] > AT_REST)):
             late = rows["t"][mask & (rows["t"] >= struck)]
             row[key] = float(late[-1] - struck) if len(late) else 0.0
@@ -210,7 +212,7 @@ def judged(case: Case, name: str, when: str, seen: dict[str, Any], rows: dict[st
         if seen["rule"] != "DEAD":
             wrong.append(f"the owner lives: {seen['rule']}")
     elif seen["rule"] not in case.rules:
-        wrong.append(f"reason {seen['rule']}: {seen.get('text', '')}")
+        wrong.append(f"reason {seen['rule']}: {reason}")
     wrong += log_troubles(case, seen, rows, struck)
     row |= {"lost": answer["lost"], "late": seen.get("late"), "disconnect": seen.get("disconnect"), "wrong": wrong}
     if wrong:
