@@ -79,6 +79,7 @@ class Controller(ConfigOptions):
         from weldsim.controller.calibration import Calibration, read_calibration
         from weldsim.controller.config import ControllerConfig
         from weldsim.controller.start import new_server
+        from weldsim.execution.priority import hurry
 
         config = ControllerConfig(
             speed=self.speed,
@@ -102,6 +103,8 @@ class Controller(ConfigOptions):
                 f"virtual UR5 controller, profile {self.profile}, on {self.host}: dashboard 29999, script 30001-30003, RTDE 30004"
             )
         sys.stdout.flush()
+        if self.speed <= 1:  # faster than that it may never sleep
+            hurry()
         server.run()
         return 0
 

@@ -24,9 +24,9 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 
+from weldsim.execution.priority import hurry
 from weldsim.execution.ur_rtde import Control, Signals, open_control, open_signals
 
 MAX_MESSAGE = 4096  # [byte]
@@ -191,12 +191,6 @@ def say(channel: socket.socket, *words: object) -> None:
         channel.send(json.dumps(words).encode())
     except OSError:
         return
-
-
-def hurry() -> None:
-    """Ask for real-time priority for this thread, not those of the library; it goes without where that is not allowed."""
-    with suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
 
 
 def main(descriptor: str, text: str) -> None:

@@ -16,6 +16,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import ExecutionError
+from weldsim.execution.priority import Haste
 from weldsim.execution.robot import Robot
 from weldsim.execution.rtde_talk import LinkError
 from weldsim.execution.ur_config import PERIODS, UrConfig
@@ -50,7 +51,8 @@ class UrRobot(Robot):
     """A UR5 on a CB3 (125 Hz) or e-Series (500 Hz) controller, real or virtual.
 
     Verified with the ur_rtde 1.6.5 client over sockets against the virtual controller, never on a real one.
-    Times are the controller's, counted from `connect`; the base is B as the controller reports it.
+    Times are the controller's, counted from `connect`; the base is B as the controller reports it. The thread that calls `servo`
+    has real-time priority from a stream's first command to the stop, where the system allows it.
     """
 
     def __init__(self, config: UrConfig | None = None) -> None:
@@ -68,6 +70,7 @@ class UrRobot(Robot):
         self._sent: deque[list[float]] = deque()
         self._told: tuple[Sample, RobotState] | None = None
         self._taken: deque[Sample] = deque(maxlen=TAKEN)
+        self._haste = Haste()
 
     @property
     def servo_times(self) -> tuple[float, ...]:
@@ -101,6 +104,7 @@ class UrRobot(Robot):
         if link is None:
             return
         self._arc = False
+        self._haste.end()
         self._settle(Halt(link, self.config, self._trouble, last=True))
         link.stream.close()
         self._link, self._served = None, -math.inf
@@ -160,6 +164,7 @@ class UrRobot(Robot):
         if not all(map(math.isfinite, target)):
             raise ExecutionError(f"{self.name}: target {target} is not finite", rule="finite", t=self._t)
         if time.monotonic() - self._served > self.config.stall:  # a new stream: the commands of the last one say nothing
+            self._haste.begin()
             self._sent.clear()
             if len(link.stream) > self._behind:
                 self._read_all(link)
@@ -181,6 +186,7 @@ class UrRobot(Robot):
 
     def stop(self) -> None:
         self._arc = False
+        self._haste.end()
         if self._link is not None:
             self._settle(Halt(self._link, self.config, self._trouble))
         self._served = -math.inf
@@ -248,6 +254,7 @@ class UrRobot(Robot):
     def _give_up(self, link: Link, trouble: Trouble) -> NoReturn:
         """Arc off and rest asked for at once; then the reason, as exactly as it can be found out."""
         self._arc = False
+        self._haste.end()
         halt = Halt(link, self.config, trouble)
         self._trouble = trouble = halt.explain(self._last) or trouble
         self._note(trouble.rule, trouble.text)
