@@ -254,7 +254,7 @@ def judge_refusal(done: Job, case: Case, cell: Cell, config: CellConfig) -> tupl
     faults = [
         f"nothing reaches s = {1e3 * s:.1f} mm, before it" for s in before if not len(postures(rail.at(np.array([s]))[0], case))
     ]
-    if why in ("unreachable", "collision", "singular"):
+    if why in ("unreachable", "collision", "singular") and "no sweep" not in text:
         # What is claimed of the place must hold there or just beyond: a coarser look gives up a little earlier.
         claims = [_claim(why, postures(rail.at(np.array([min(s, rail.s[-1])]))[0], case), cell) for s in (at, at + FIRST)]
         return why, (*faults, *(() if "" in claims else claims[:1])), True
