@@ -43,7 +43,7 @@ class Nothing(Robot):
         return self._now
 
     def facts(self) -> RobotFacts:
-        raise NotImplementedError
+        return RobotFacts(model="none", series="simulated", version="1", serial="0")
 
     def servo(self, q: ndarray, qd: ndarray) -> ndarray:
         self._now = RobotState(t=self._now.t + self.period, q=q, qd=qd, X_BT=self._now.X_BT)
