@@ -16,7 +16,7 @@ import rtde_control
 import rtde_io
 import rtde_receive
 
-from tests.ur_tour import away
+from tests.ur_tour import away, told
 
 EXAMPLE = [-1.54, -1.83, -2.28, -0.59, 1.60, 0.023]  # where ur_rtde's examples begin
 DOWN = [0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0]
@@ -51,18 +51,18 @@ def visit(host: str) -> dict[str, Any]:
         control.moveL(pose, 0.5, 1.0),
         control.moveL([[*pose, 0.8, 1.5, 0.0], [*corner, 0.8, 1.5, 0.02], [*end, 0.8, 1.5, 0.0]]),
     ]
-    seen["examples_off"] = away(receive.getActualTCPPose()[:3], end[:3])
+    seen["examples_off"] = away(told(receive).getActualTCPPose()[:3], end[:3])
 
     answers = [control.forceMode([0.0] * 6, [0, 0, 1, 0, 0, 0], [0, 0, -10, 0, 0, 0], 2, [2, 2, 1.5, 1, 1, 1]) for _ in range(20)]
     seen["force"] = [all(answers), control.forceModeStop(), control.isProgramRunning()]
 
     seen["down"] = [control.moveJ(DOWN, 3.0, 6.0)]
-    start = receive.getActualTCPPose()
+    start = told(receive).getActualTCPPose()
     for k, way in ((2, -0.10), (0, -0.08), (2, 0.10)):  # from the pose with round angles, along two axes
-        goal = receive.getTargetTCPPose()
+        goal = told(receive).getTargetTCPPose()
         goal[k] += way
         seen["down"].append(control.moveL(goal, 0.6, 2.0))
-    there = receive.getActualTCPPose()
+    there = told(receive).getActualTCPPose()
     seen["down_off"] = away(there[:3], [start[0] - 0.08, start[1], start[2]])
 
     control.moveJ([0.4, *DOWN[1:]], 2.0, 4.0)
@@ -88,7 +88,7 @@ def visit(host: str) -> dict[str, Any]:
     dashboard.play()
     while control.getAsyncOperationProgress() >= 0:
         time.sleep(0.01)
-    seen["resumed_off"] = away(receive.getActualQ(), [0.6, *DOWN[1:]])
+    seen["resumed_off"] = away(told(receive).getActualQ(), [0.6, *DOWN[1:]])
 
     control.speedL([0, 0, 0.1, 0, 0, 0], 0.5)
     rows = []

@@ -18,6 +18,12 @@ import rtde_receive
 PAUSE = 0.1  # [s] for what was written to come back
 
 
+def told(receive: Any) -> Any:
+    """The receive interface when it has heard of what the control interface saw, whose stream is another one."""
+    time.sleep(PAUSE)
+    return receive
+
+
 def tour(host: str) -> dict[str, Any]:
     """The answers, by what was asked."""
     receive = rtde_receive.RTDEReceiveInterface(host)
@@ -31,7 +37,7 @@ def tour(host: str) -> dict[str, Any]:
         "model": dashboard.getRobotModel(),
     }
     control = rtde_control.RTDEControlInterface(host)
-    seen["running"] = control.isProgramRunning(), receive.getRuntimeState(), dashboard.running()
+    seen["running"] = control.isProgramRunning(), told(receive).getRuntimeState(), dashboard.running()
     seen |= moves(control, receive)
     seen |= kinematics(control, receive)
     seen |= signals(io, receive)
@@ -49,12 +55,12 @@ def away(a: list[float], b: list[float]) -> float:
 def moves(control: Any, receive: Any) -> dict[str, Any]:
     q = receive.getActualQ()
     q[0] += 0.2
-    seen: dict[str, Any] = {"moveJ": control.moveJ(q, 1.0, 2.0), "moveJ_off": away(receive.getActualQ(), q)}
+    seen: dict[str, Any] = {"moveJ": control.moveJ(q, 1.0, 2.0), "moveJ_off": away(told(receive).getActualQ(), q)}
     pose = receive.getActualTCPPose()
     pose[2] += 0.04
-    seen |= {"moveL": control.moveL(pose, 0.2, 1.0), "moveL_off": away(receive.getActualTCPPose()[:3], pose[:3])}
+    seen |= {"moveL": control.moveL(pose, 0.2, 1.0), "moveL_off": away(told(receive).getActualTCPPose()[:3], pose[:3])}
     pose[2] -= 0.04
-    seen |= {"moveJ_IK": control.moveJ_IK(pose, 1.0, 2.0), "moveJ_IK_off": away(receive.getActualTCPPose()[:3], pose[:3])}
+    seen |= {"moveJ_IK": control.moveJ_IK(pose, 1.0, 2.0), "moveJ_IK_off": away(told(receive).getActualTCPPose()[:3], pose[:3])}
     q[0] -= 0.4
     seen["async"] = control.moveJ(q, 0.4, 2.0, True)
     time.sleep(0.3)
@@ -63,7 +69,7 @@ def moves(control: Any, receive: Any) -> dict[str, Any]:
     time.sleep(PAUSE)
     seen |= {"stopJ_speed": max(map(abs, receive.getActualQd())), "stopJ_short": away(receive.getActualQ(), q)}
     seen["path"] = control.moveJ([[*q, 1.0, 2.0, 0.0], [*(x + 0.1 for x in q), 1.0, 2.0, 0.0]])
-    seen["path_off"] = away(receive.getActualQ(), [x + 0.1 for x in q])
+    seen["path_off"] = away(told(receive).getActualQ(), [x + 0.1 for x in q])
     return seen
 
 
@@ -144,7 +150,7 @@ def stops(control: Any, receive: Any, dashboard: Any) -> dict[str, Any]:
     seen["reupload2"] = control.reuploadScript()
     time.sleep(0.4)
     q[0] += 0.1
-    seen |= {"recovered": control.moveJ(q, 1.0, 2.0), "recovered_off": away(receive.getActualQ(), q)}
+    seen |= {"recovered": control.moveJ(q, 1.0, 2.0), "recovered_off": away(told(receive).getActualQ(), q)}
     control.stopScript()
     time.sleep(PAUSE)
     seen |= {"stop_script": receive.getRuntimeState(), "still_connected": receive.isConnected()}

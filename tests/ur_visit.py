@@ -16,7 +16,7 @@ import rtde_control
 import rtde_io
 import rtde_receive
 
-from tests.ur_tour import PAUSE, away
+from tests.ur_tour import PAUSE, away, told
 
 TOOL = [0.0, 0.048, 0.227, -0.85, 0.0, 0.0]
 SKIPPED = ("getDigitalInState", "getDigitalOutState", "getOutputDoubleRegister", "getOutputIntRegister")
@@ -38,7 +38,7 @@ def visit(host: str) -> dict[str, Any]:
     seen: dict[str, Any] = {"files": files(dashboard), "power": power(dashboard)}
     control = rtde_control.RTDEControlInterface(host)
     period = 1 / 125 if dashboard.polyscopeVersion().startswith("3") else 1 / 500
-    seen |= reports(receive) | tools(control, receive) | signals(control, io, receive)
+    seen |= reports(told(receive)) | tools(control, receive) | signals(control, io, receive)
     seen |= streams(control, receive, period) | paths(control, receive) | refusals(control, receive)
     for client in (control, receive, io, dashboard):
         client.disconnect()
@@ -143,13 +143,13 @@ def paths(control: Any, receive: Any) -> dict[str, Any]:
         path.addEntry(
             rtde_control.PathEntry(rtde_control.PathEntry.MoveJ, rtde_control.PathEntry.PositionJoints, [*target, 1.0, 2.0, 0.0])
         )
-    seen: dict[str, Any] = {"movePath": control.movePath(path, False), "movePath_off": away(receive.getActualQ(), q)}
+    seen: dict[str, Any] = {"movePath": control.movePath(path, False), "movePath_off": away(told(receive).getActualQ(), q)}
     control.moveJ([[*other, 1.0, 2.0, 0.01], [*q, 1.0, 2.0, 0.0]], True)
     progress, end = [], time.monotonic() + 6
     while time.monotonic() < end and (not progress or progress[-1] >= 0):
         progress.append(control.getAsyncOperationProgress())
         time.sleep(0.02)
-    seen |= {"progress": sorted(set(progress)), "path_off": away(receive.getActualQ(), q)}
+    seen |= {"progress": sorted(set(progress)), "path_off": away(told(receive).getActualQ(), q)}
     pose = receive.getActualTCPPose()
     pose[2] += 0.05
     control.moveL(pose, 0.05, 1.0, True)
