@@ -81,3 +81,11 @@ class ViewError(UnreachableError):
 
 class ExecutionError(MotionError):
     """The arm was stopped while moving. `data`: rule, value, limit, t."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Somebody interrupted an arm that was moving; it was stopped first. `log`: what it did until it was at rest."""
+
+    def __init__(self, message: str, log: object) -> None:
+        super().__init__(message)
+        self.log = log

@@ -2,7 +2,9 @@
 
 import copy
 import json
+import os
 import shlex
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -210,6 +212,40 @@ def test_a_stop_exits_1_keeps_the_log_and_says_where_the_black_box_is(tmp_path: 
     assert "tracking" in record.reason
     assert Path(said["black_box"]).parent == tmp_path / "out.black-box"
     assert len(np.load(out / "log.npz")["t"]) > 1
+
+
+def test_ctrl_c_exits_130_and_keeps_the_log_and_twice_does_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    true_set_arc, true_stop, calls = SimulatedRobot.set_arc, SimulatedRobot.stop, []
+    stopped: list[bool] = []
+
+    def set_arc(self: SimulatedRobot, on: bool) -> None:
+        true_set_arc(self, on)
+        calls.append(on)
+        if sum(calls) == 50:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def stop(self: SimulatedRobot) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        true_stop(self)
+        stopped.append(True)
+
+    monkeypatch.setattr(SimulatedRobot, "set_arc", set_arc)
+    monkeypatch.setattr(SimulatedRobot, "stop", stop)
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    out = tmp_path / "out"
+    assert main(["execute", written(tmp_path, document()), "--robot", "sim", "--arc", "--out", str(out), "--json"]) == 130
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+    said = json.loads(capsys.readouterr().out)
+    assert stopped
+    assert said["stopped"]["text"].startswith("interrupted: the arc is off and the arm was stopped; black box: ")
+    assert not said["passed"]
+    log = np.load(out / "log.npz")
+    assert 0 < log["arc_on"].sum() < len(log["t"])
+    assert not log["arc_on"][-1]
+    assert np.abs(log["qd_act"][-1]).max() < 5e-3
+    assert "interrupted" in json.loads((out / "run.json").read_text())["stopped"]
 
 
 def test_a_broken_contract_moves_nothing(

@@ -15,9 +15,10 @@ import warnings
 from collections.abc import Sequence
 
 from weldsim import __version__
+from weldsim.cli.signals import INTERRUPTED
 from weldsim.errors import WeldsimError
 
-DEFECT, INTERRUPTED, NO_READER = 70, 130, 141  # sysexits.h EX_SOFTWARE; 128 + SIGINT; 128 + SIGPIPE
+DEFECT, NO_READER = 70, 141  # sysexits.h EX_SOFTWARE; 128 + SIGPIPE
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -1,7 +1,6 @@
 """`weldsim execute`."""
 
 import shlex
-import signal
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,6 +11,7 @@ from weldsim.cli.dry_run import failures
 from weldsim.cli.options import ConfigOptions
 from weldsim.cli.outputs import check_folder, nearest_folder
 from weldsim.cli.show import print_json, progress, table, times
+from weldsim.cli.signals import INTERRUPTED, interrupted_once
 from weldsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ class Execute(ConfigOptions):
     """Weld a path with a robot, the twin's or a real one, through the safety gate.
 
     Checks the contract with the robot, plans from where it stands, refuses what a dry run refuses, then moves. Writes a run
-    directory with log and report. Exits 1 when the robot was refused or stopped, or the weld failed its verdict.
+    directory with log and report. Exits 1 when the robot was refused or stopped, or the weld failed its verdict; Ctrl-C
+    stops the arm, keeps its log too, and exits 130.
     """
 
     file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
@@ -83,11 +84,11 @@ class Execute(ConfigOptions):
         scene = None if self.scene is None else self.scene_of(self.scene)
         config = paced_for(config, scene)
         cell, known = self._cell(scene, config)
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # stops the arm, as Ctrl-C does
         with progress() as tell:
             clock = Clock(tell)
             robot = self._robot(config, cell)
-            done = weld(program, findings, robot, cell, config, job, scene=scene, known=known, clock=clock)
+            with interrupted_once():
+                done = weld(program, findings, robot, cell, config, job, scene=scene, known=known, clock=clock)
             tell("writing", None)
             write_job(folder, self.file, program, findings, cloud, done, job, config, cell.name, scene, known)
         written = [folder, *([done.black_box] if done.black_box is not None else [])]
@@ -95,6 +96,8 @@ class Execute(ConfigOptions):
             print_json({**job_document(done, program, job, config, cell.name, scene), "written": [str(path) for path in written]})
         else:
             self._print(done, program, job, config, scene, written)
+        if done.interrupted:
+            return INTERRUPTED
         return 0 if done.passed else 1
 
     def _program(self, config: "CellConfig") -> "Program":
@@ -162,7 +165,8 @@ class Execute(ConfigOptions):
             if rows:
                 print(table(rows, ("figure", "measured", "limit", "")))
             for reason in () if done.report.passed else done.report.reasons:
-                print(f"  {reason}")
+                if reason != str(done.stopped):  # which stands above
+                    print(f"  {reason}")
         if done.log is not None:
             pace = "" if job.speed_scale == 1 else f" at {100 * job.speed_scale:g} % of the pace"
             print(f"  arc {_arc(done.log, job)}; {done.log.t[-1] - done.log.t[0]:.1f} s{pace}")

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.errors import ExecutionError
+from weldsim.errors import ExecutionError, Interrupted
 from weldsim.execution.config import ExecutionConfig
 from weldsim.execution.gate import SafetyGate
 from weldsim.execution.resample import at_period, started_at
@@ -95,7 +95,7 @@ def execute(
     Raises:
         ExecutionError: the robot has no gate, the arm does not stand where the trajectory starts, a command breaks a rule,
             or the robot stopped; `data`: rule, value, limit, t, and `log` with what was done until then.
-        KeyboardInterrupt: somebody interrupted; the arm was stopped first, and the message says where the black box is.
+        Interrupted: by Ctrl-C; the arm was stopped first. The message says where the black box is, `log` has what was done.
     """
     if not isinstance(robot, SafetyGate):
         raise ExecutionError("no robot is moved without its safety gate: execute(SafetyGate(robot), ...)", rule="gate")
@@ -125,8 +125,9 @@ def execute(
         raise
     except KeyboardInterrupt as interrupt:
         robot.stop()
+        recorder.end()
         box = "" if robot.black_box is None else f"; black box: {robot.black_box}"
-        raise KeyboardInterrupt(f"interrupted: the arc is off and the arm was stopped{box}") from interrupt
+        raise Interrupted(f"interrupted: the arc is off and the arm was stopped{box}", recorder.log()) from interrupt
     except BaseException:
         robot.stop()
         raise

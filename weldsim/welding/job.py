@@ -13,7 +13,7 @@ from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.program import Program
 from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.verdict import Trial
-from weldsim.errors import ExecutionError, InputError
+from weldsim.errors import ExecutionError, InputError, Interrupted
 from weldsim.execution.contract import Clause, contract, require_kept
 from weldsim.execution.gate import SafetyGate
 from weldsim.execution.resample import LEAST_SCALE, at_period, slowed
@@ -23,6 +23,8 @@ from weldsim.path.asked import leaned, wire_tip
 from weldsim.records import ExecutionLog, KnownSeam, RobotFacts, SeamFindings, Segment, TorchPath, WeldReport
 from weldsim.report.weld import weld_report
 from weldsim.scene.config import SceneConfig
+
+INTERRUPT = "interrupt"  # the rule that a stop by Ctrl-C is told under
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +79,11 @@ class Job:
         """Whether it was welded, and within every limit."""
         return self.stopped is None and self.report is not None and self.report.passed
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether somebody stopped it by hand while it moved."""
+        return self.stopped is not None and self.stopped.data.get("rule") == INTERRUPT
+
 
 def weld(
     program: Program,
@@ -93,7 +100,8 @@ def weld(
     """A path of a program executed by a robot through its safety gate.
 
     Nothing moves unless the robot keeps its contract and the whole motion, planned from where the robot says it stands, passes
-    the dry run and every rule of the gate.
+    the dry run and every rule of the gate. Ctrl-C while it moves stops the arm and ends the job, which keeps its log; earlier it
+    is raised as ever.
 
     Args:
         program: as `read_program` gives it, with paths.  findings: its seams, one a path.
@@ -133,6 +141,9 @@ def weld(
         stopped = error
         found = error.data.get("log")
         log = found if isinstance(found, ExecutionLog) else None
+    except Interrupted as interrupt:
+        stopped = ExecutionError(str(interrupt), rule=INTERRUPT)
+        log = interrupt.log if isinstance(interrupt.log, ExecutionLog) else None
     finally:
         gate.disconnect()
     path = replace(path, speed=path.speed * job.speed_scale)

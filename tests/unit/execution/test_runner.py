@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tests.arm_worlds import bare_model
 from tests.torch_paths import START, flat_curve, torch_path
-from weldsim.errors import ExecutionError
+from weldsim.errors import ExecutionError, Interrupted
 from weldsim.execution.config import ExecutionConfig, SimulationConfig
 from weldsim.execution.gate import SafetyGate
 from weldsim.execution.resample import at_period, slowed
@@ -141,10 +141,13 @@ def test_an_interrupt_stops_the_arm(trajectory: JointTrajectory) -> None:
         if done > 0.5:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="arm was stopped"):
+    with pytest.raises(Interrupted, match="arm was stopped") as caught:
         execute(gated(robot), trajectory, None, interrupt)
     assert robot.stopped
     assert not robot.arc
+    log = caught.value.log
+    assert isinstance(log, ExecutionLog)
+    assert 0.4 < len(log.t) / len(trajectory.t) < 0.7
 
 
 def test_arc_outside_the_weld_moves_nothing(trajectory: JointTrajectory) -> None:
