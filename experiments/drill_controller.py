@@ -33,6 +33,7 @@ from weldsim.controller.fault_names import FaultName
 from weldsim.controller.faults import FaultSession, inject
 from weldsim.controller.server import Server
 from weldsim.controller.start import new_server
+from weldsim.execution.priority import hurry
 
 MOVING = 1e-4  # [rad/s] of the reference: the arm is commanded to move
 SIGNALS = {"kill": signal.SIGKILL, "hold": signal.SIGSTOP, "go": signal.SIGCONT}
@@ -177,6 +178,8 @@ def main() -> None:
     server = new_server(asked.profile, scene, ControllerConfig(speed=asked.speed), asked.host)
     Watched(server, sys.stdin.fileno())
     print(json.dumps({"serving": asked.host}), flush=True)
+    if asked.speed <= 1.0:
+        hurry()
     server.run()
 
 

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 
 from tests.arm_worlds import bare_model
 from weldsim.controller.arm import Arm
@@ -14,8 +15,13 @@ from weldsim.controller.config import ControllerConfig
 from weldsim.controller.functions import builtins
 from weldsim.controller.machine import Machine
 from weldsim.controller.profile import PROFILES, Series
-from weldsim.execution.ur_ports import FAULTS
+from weldsim.execution.ur_ports import DASHBOARD, FAULTS, PRIMARY, PRIMARY_READ_ONLY, REALTIME, RTDE, SECONDARY
 from weldsim.scene.world import HOME
+
+PORTS = (DASHBOARD, PRIMARY, SECONDARY, REALTIME, RTDE, PRIMARY_READ_ONLY, FAULTS)
+PATIENCE = 30.0  # [s] in which what must come has come, on a machine that others use too
+
+UNLOCK_DELAY = 2.0  # [s] of the controller that `tests.ur_tour` tours: who tries too early must not come too late
 
 
 def new_machine(series: Series = "cb3", config: ControllerConfig | None = None) -> Machine:
@@ -35,16 +41,33 @@ def run_program(machine: Machine, text: str, seconds: float = 10.0) -> float:
     return machine.t - began
 
 
-def free_address() -> str:
-    """A loopback address whose controller ports nobody uses."""
+@cache
+def own_network() -> tuple[str, socket.socket]:
+    """The first half of addresses that are this process's own, other tests run beside it, and the socket that reserves them."""
     for k in range(200):
-        host = f"127.{20 + os.getpid() % 200}.{k}.7"
-        with socket.socket() as probe:
-            try:
-                probe.bind((host, FAULTS))
-            except OSError:
-                continue
-            return host
+        half = f"127.{20 + (os.getpid() + k) % 200}"
+        mark = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            mark.bind((f"{half}.255.7", FAULTS))
+        except OSError:
+            mark.close()
+            continue
+        return half, mark
+    raise AssertionError("no free loopback network")
+
+
+def free_address() -> str:
+    """A loopback address none of whose controller ports is in use."""
+    half, _ = own_network()
+    for k in range(250):
+        host = f"{half}.{k}.7"
+        try:
+            for port in PORTS:
+                with socket.socket() as probe:
+                    probe.bind((host, port))
+        except OSError:
+            continue
+        return host
     raise AssertionError("no free loopback address")
 
 
@@ -61,10 +84,10 @@ def served(*options: str) -> Iterator[str]:
             yield host
         finally:
             process.terminate()
-            process.wait(10)
+            process.wait(PATIENCE)
 
 
-def wait_for(condition: object, seconds: float = 5.0, step: float = 0.02) -> bool:
+def wait_for(condition: object, seconds: float = PATIENCE, step: float = 0.02) -> bool:
     """Whether `condition()` came true within `seconds`."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:

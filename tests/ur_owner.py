@@ -7,11 +7,11 @@ log's times, arc and events; how long the stop took [s], and the arc output afte
 
 import json
 import sys
-import time
 
 import numpy as np
 
-from tests.ur_robots import weld
+from tests.machine import Watch
+from tests.ur_robots import CONNECT_TIMEOUT, weld
 from weldsim.errors import ExecutionError
 from weldsim.execution.gate import SafetyGate
 from weldsim.execution.runner import execute
@@ -23,7 +23,7 @@ MOVING = 0.05  # [rad/s]
 
 
 def main(host: str) -> None:
-    robot, told = UrRobot(UrConfig(host=host)), False
+    robot, told = UrRobot(UrConfig(host=host, connect_timeout=CONNECT_TIMEOUT)), False
 
     def tell(done: float) -> None:
         nonlocal told
@@ -32,13 +32,15 @@ def main(host: str) -> None:
             print("WELDING", robot.client_pid, flush=True)
 
     error: ExecutionError | None = None
-    with SafetyGate(robot, arc=True) as gate:
-        try:
-            log = execute(gate, weld(robot.state().q, gate.period), progress=tell)
-        except ExecutionError as caught:
-            error, log = caught, caught.data.get("log")
-        ended = time.monotonic()
-    print("ENDED", json.dumps(summary(error, log, robot) | {"disconnect": time.monotonic() - ended}), flush=True)
+    with Watch() as watch:
+        with SafetyGate(robot, arc=True) as gate:
+            try:
+                log = execute(gate, weld(robot.state().q, gate.period), progress=tell)
+            except ExecutionError as caught:
+                error, log = caught, caught.data.get("log")
+            ended = watch.clock()
+        took = watch.clock() - ended
+    print("ENDED", json.dumps(summary(error, log, robot) | {"disconnect": took, "held_up": watch.worst}), flush=True)
 
 
 def summary(error: ExecutionError | None, log: object, robot: UrRobot) -> dict[str, object]:

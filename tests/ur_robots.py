@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy import ndarray
 
-from tests.controllers import served, wait_for
+from tests.controllers import PATIENCE, served, wait_for
 from weldsim.controller.ask import ask
 from weldsim.execution.ur_config import Series, UrConfig
 from weldsim.execution.ur_ports import REALTIME
@@ -15,6 +15,9 @@ from weldsim.execution.ur_robot import UrRobot
 from weldsim.kinematics import JOINT_NAMES
 from weldsim.records import JointTrajectory, Segment
 
+CONNECT_TIMEOUT = 30.0  # [s] a client process may be long in coming where others keep the machine busy
+PATIENT = {"connect_timeout": CONNECT_TIMEOUT, "watchdog_rate": 2.0, "stall": 0.4, "answer_timeout": 0.4, "silence": 1.0}
+"""Settings of a robot that a busy machine does not stop at once, for tests of what it does while it is not stopped."""
 SPEED, ACCELERATION = 2.0, 6.0  # [rad/s], [rad/s2] of the way to where a test begins
 
 
@@ -29,9 +32,9 @@ def place(host: str, q: ndarray) -> None:
     """The arm at rest at q, nothing running and nothing wrong."""
     ask(host, {"fault": "recover"})
     program = f"def go():\n  movej([{', '.join(f'{x:.9f}' for x in q)}], a={ACCELERATION}, v={SPEED})\nend\n"
-    with socket.create_connection((host, REALTIME), 2.0) as sock:
+    with socket.create_connection((host, REALTIME), PATIENCE) as sock:
         sock.sendall(program.encode())
-        assert wait_for(lambda: _there(host, q), 10.0)
+        assert wait_for(lambda: _there(host, q))
 
 
 def _there(host: str, q: ndarray) -> bool:
@@ -39,11 +42,11 @@ def _there(host: str, q: ndarray) -> bool:
     return not now["program"] and bool(np.abs(np.array(now["q"]) - q).max() < 5e-4)
 
 
-def ur_robot(host: str, q: ndarray | None = None, **settings: object) -> UrRobot:
-    """A UrRobot, not connected, whose arm rests at q; where it is, without one."""
+def ur_robot(host: str, q: ndarray | None = None) -> UrRobot:
+    """A patient UrRobot, not connected, whose arm rests at q; where it is, without one."""
     if q is not None:
         place(host, q)
-    return UrRobot(UrConfig(host=host, **settings))  # type: ignore[arg-type]
+    return UrRobot(UrConfig(host=host, **PATIENT))
 
 
 def weld(q: ndarray, period: float, seconds: float = 5.0, reach: float = 0.3) -> JointTrajectory:

@@ -6,40 +6,23 @@ Runs in a process of its own, `python -m tests.ur_stranger ADDRESS`, as `tests.u
 import json
 import math
 import sys
-import threading
-import time
-from collections.abc import Callable
 from typing import Any
 
 import dashboard_client
 import rtde_control
 import rtde_io
-import rtde_receive
 
-from tests.ur_tour import away, told
+from tests.ur_record import Recorder
+from tests.ur_wait import Receiver, away, later, told, until
 
 EXAMPLE = [-1.54, -1.83, -2.28, -0.59, 1.60, 0.023]  # where ur_rtde's examples begin
 DOWN = [0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0]
-REST = 0.05  # [s] for what was reported to arrive
-
-
-def watch(receive: Any, call: Callable[[], Any], *reads: str) -> tuple[Any, list[list[Any]]]:
-    """What a call answered, and rows of time and readings while it ran."""
-    answer: list[Any] = []
-    thread = threading.Thread(target=lambda: answer.append(call()))
-    thread.start()
-    rows: list[list[Any]] = []
-    while thread.is_alive():
-        t = receive.getTimestamp()
-        if not rows or t != rows[-1][0]:
-            rows.append([t, *(getattr(receive, read)() for read in reads)])
-        time.sleep(0.001)
-    return answer[0], rows
+WATCHED = {"target_qd": "VECTOR6D", "target_TCP_speed": "VECTOR6D", "speed_scaling": "DOUBLE"}
 
 
 def visit(host: str) -> dict[str, Any]:
     """The answers, by what was asked."""
-    receive, io = rtde_receive.RTDEReceiveInterface(host), rtde_io.RTDEIOInterface(host)
+    receive, io = Receiver(host), rtde_io.RTDEIOInterface(host)
     dashboard = dashboard_client.DashboardClient(host)
     dashboard.connect()
     control = rtde_control.RTDEControlInterface(host)
@@ -65,45 +48,25 @@ def visit(host: str) -> dict[str, Any]:
     there = told(receive).getActualTCPPose()
     seen["down_off"] = away(there[:3], [start[0] - 0.08, start[1], start[2]])
 
-    control.moveJ([0.4, *DOWN[1:]], 2.0, 4.0)
-    io.setSpeedSlider(0.5)
-    time.sleep(0.2)
-    _, rows = watch(receive, lambda: control.moveJ(DOWN, 0.8, 4.0), "getTargetQd", "getSpeedScalingCombined")
-    moving = [t for t, qd, _ in rows if abs(qd[0]) > 1e-6]
-    seen["slow"] = [moving[-1] - moving[0], max(abs(qd[0]) for _, qd, _ in rows), rows[-1][2]]
-    io.setSpeedSlider(1.0)
-    time.sleep(0.2)
+    with Recorder(host, WATCHED) as recorder:
+        seen |= laws(control, receive, io, recorder)
 
-    goal = receive.getTargetTCPPose()
-    goal[2] += 0.10
-    seen["fast"], rows = watch(receive, lambda: control.moveL(goal, 3.0, 150.0), "getSpeedScaling", "getTargetQd")
-    seen["limited"] = [min(row[1] for row in rows), max(max(map(abs, row[2])) for row in rows), receive.getSafetyMode()]
-
-    control.moveJ([0.6, *DOWN[1:]], 0.4, 2.0, True)
-    time.sleep(0.3)
+    control.moveJ([0.6, *DOWN[1:]], 0.15, 2.0, True)  # 4 s, to be held on the way even by who is held up
+    until(lambda: control.getAsyncOperationProgress() >= 0 and receive.getActualQ()[0] > 0.05)
     seen["waypoint"] = [control.getTargetWaypoint()[:3], control.getForwardKinematics([0.6, *DOWN[1:]], [0, 0, 1e-9, 0, 0, 0])[:3]]
     dashboard.pause()
-    time.sleep(0.3)
+    later(receive, 0.3)
     seen["paused"] = [receive.getRuntimeState(), max(map(abs, receive.getActualQd()))]
     dashboard.play()
-    while control.getAsyncOperationProgress() >= 0:
-        time.sleep(0.01)
+    until(lambda: control.getAsyncOperationProgress() < 0)
     seen["resumed_off"] = away(told(receive).getActualQ(), [0.6, *DOWN[1:]])
-
-    control.speedL([0, 0, 0.1, 0, 0, 0], 0.5)
-    rows = []
-    while receive.getTargetTCPSpeed()[2] < 0.0999 and len(rows) < 500:
-        rows.append([receive.getTimestamp(), receive.getTargetTCPSpeed()[2]])
-        time.sleep(0.002)
-    (t0, v0), (t1, v1) = next(row for row in rows if row[1] > 0.01), rows[-1]
-    seen["acceleration"] = [(v1 - v0) / (t1 - t0), control.speedStop()]
 
     control.stopScript()
     control.disconnect()
     states = []
     for ask in (dashboard.powerOff, dashboard.powerOn, dashboard.brakeRelease):
         ask()
-        time.sleep(REST)
+        told(receive)
         states.append([receive.getRobotMode(), receive.getJointMode()[0], receive.getActualRobotVoltage()])
     seen["power"] = states
     again = []
@@ -112,6 +75,35 @@ def visit(host: str) -> dict[str, Any]:
         again.append(control.moveJ(receive.getActualQ()))
         control.disconnect()
     return seen | {"again": again, "gravity": receive.getActualToolAccelerometer()}
+
+
+def laws(control: Any, receive: Receiver, io: Any, recorder: Recorder) -> dict[str, Any]:
+    """How moves speed up, how fast they are, and what slows them down; the arm is at DOWN before and above it after."""
+    seen: dict[str, Any] = {}
+    control.moveJ([0.4, *DOWN[1:]], 2.0, 4.0)
+    io.setSpeedSlider(0.5)
+    until(lambda: receive.getSpeedScalingCombined() == 0.5)
+    later(receive, 0.4)  # it comes into effect gradually
+    _, rows = recorder.during(lambda: control.moveJ(DOWN, 0.8, 4.0))
+    moving = [row[0] for row in rows if abs(row[1][0]) > 1e-6]
+    seen["slow"] = [moving[-1] - moving[0], max(abs(row[1][0]) for row in rows), told(receive).getSpeedScalingCombined()]
+    io.setSpeedSlider(1.0)
+    until(lambda: receive.getSpeedScalingCombined() == 1.0)
+    later(receive, 0.4)
+
+    goal = receive.getTargetTCPPose()
+    goal[2] += 0.10
+    seen["fast"], rows = recorder.during(lambda: control.moveL(goal, 3.0, 150.0))
+    seen["limited"] = [min(row[3] for row in rows), max(max(map(abs, row[1])) for row in rows), told(receive).getSafetyMode()]
+
+    def speed_up() -> None:
+        control.speedL([0, 0, 0.1, 0, 0, 0], 0.5)
+        later(receive, 0.3)
+
+    _, rows = recorder.during(speed_up)
+    ramp = [(row[0], row[2][2]) for row in rows if 0.01 < row[2][2] < 0.0999]
+    (t0, v0), (t1, v1) = ramp[0], ramp[-1]
+    return seen | {"acceleration": [(v1 - v0) / (t1 - t0), control.speedStop()]}
 
 
 if __name__ == "__main__":

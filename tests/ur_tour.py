@@ -13,20 +13,14 @@ from typing import Any
 import dashboard_client
 import rtde_control
 import rtde_io
-import rtde_receive
 
-PAUSE = 0.1  # [s] for what was written to come back
-
-
-def told(receive: Any) -> Any:
-    """The receive interface when it has heard of what the control interface saw, whose stream is another one."""
-    time.sleep(PAUSE)
-    return receive
+from tests.controllers import UNLOCK_DELAY
+from tests.ur_wait import Receiver, away, later, told, until
 
 
 def tour(host: str) -> dict[str, Any]:
     """The answers, by what was asked."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
+    receive = Receiver(host)
     io = rtde_io.RTDEIOInterface(host)
     dashboard = dashboard_client.DashboardClient(host)
     dashboard.connect()
@@ -48,11 +42,7 @@ def tour(host: str) -> dict[str, Any]:
     return seen
 
 
-def away(a: list[float], b: list[float]) -> float:
-    return max(abs(x - y) for x, y in zip(a, b, strict=True))
-
-
-def moves(control: Any, receive: Any) -> dict[str, Any]:
+def moves(control: Any, receive: Receiver) -> dict[str, Any]:
     q = receive.getActualQ()
     q[0] += 0.2
     seen: dict[str, Any] = {"moveJ": control.moveJ(q, 1.0, 2.0), "moveJ_off": away(told(receive).getActualQ(), q)}
@@ -62,22 +52,23 @@ def moves(control: Any, receive: Any) -> dict[str, Any]:
     pose[2] -= 0.04
     seen |= {"moveJ_IK": control.moveJ_IK(pose, 1.0, 2.0), "moveJ_IK_off": away(told(receive).getActualTCPPose()[:3], pose[:3])}
     q[0] -= 0.4
-    seen["async"] = control.moveJ(q, 0.4, 2.0, True)
-    time.sleep(0.3)
+    start = receive.getActualQ()
+    seen["async"] = control.moveJ(q, 0.1, 2.0, True)  # 4 s, to be stopped on the way even by who is held up
+    until(lambda: control.getAsyncOperationProgress() >= 0 and away(receive.getActualQ(), start) > 0.02)
     seen["async_progress"] = control.getAsyncOperationProgress()
     control.stopJ(4.0)
-    time.sleep(PAUSE)
+    later(receive, 0.05)
     seen |= {"stopJ_speed": max(map(abs, receive.getActualQd())), "stopJ_short": away(receive.getActualQ(), q)}
     seen["path"] = control.moveJ([[*q, 1.0, 2.0, 0.0], [*(x + 0.1 for x in q), 1.0, 2.0, 0.0]])
     seen["path_off"] = away(told(receive).getActualQ(), [x + 0.1 for x in q])
     return seen
 
 
-def kinematics(control: Any, receive: Any) -> dict[str, Any]:
+def kinematics(control: Any, receive: Receiver) -> dict[str, Any]:
     q, tool = receive.getActualQ(), [0.01, 0.02, 0.1, 0.1, 0.0, 0.0]
     seen: dict[str, Any] = {"setTcp": control.setTcp(tool), "tcp_offset": control.getTCPOffset(), "q": q}
     seen |= {"setPayload": control.setPayload(1.3, [0.0, 0.01, 0.05])}
-    time.sleep(PAUSE)
+    told(receive)
     seen |= {"payload": receive.getPayload(), "cog": receive.getPayloadCog(), "tcp_pose": receive.getActualTCPPose()}
     seen |= {"fk": control.getForwardKinematics(q, tool), "ik": control.getInverseKinematics(seen["tcp_pose"])}
     seen["ik_near"] = control.getInverseKinematics(seen["tcp_pose"], q)
@@ -86,24 +77,25 @@ def kinematics(control: Any, receive: Any) -> dict[str, Any]:
     return seen
 
 
-def signals(io: Any, receive: Any) -> dict[str, Any]:
+def signals(io: Any, receive: Receiver) -> dict[str, Any]:
     seen: dict[str, Any] = {"digital": []}
     for on in (True, False):
         io.setStandardDigitalOut(3, on)
         io.setToolDigitalOut(1, on)
-        time.sleep(PAUSE)
+        until(lambda bits=(1 << 3 | 1 << 17) * on: receive.getActualDigitalOutputBits() == bits)
         seen["digital"].append(receive.getActualDigitalOutputBits())
     io.setAnalogOutputVoltage(0, 0.25)
     io.setAnalogOutputCurrent(1, 0.5)
     io.setSpeedSlider(0.5)
-    time.sleep(PAUSE)
+    until(lambda: receive.getSpeedScalingCombined() == 0.5)
     seen["analog"] = receive.getStandardAnalogOutput0(), receive.getStandardAnalogOutput1()
     seen["slider"] = receive.getSpeedScalingCombined()
     io.setSpeedSlider(1.0)
+    until(lambda: receive.getSpeedScalingCombined() == 1.0)
     return seen
 
 
-def streams(control: Any, receive: Any, period: float) -> dict[str, Any]:
+def streams(control: Any, receive: Receiver, period: float) -> dict[str, Any]:
     start, count, times = receive.getActualQ(), round(0.8 / period), []
     q = list(start)
     for k in range(count):
@@ -115,28 +107,29 @@ def streams(control: Any, receive: Any, period: float) -> dict[str, Any]:
         control.waitPeriod(began)
     gaps = sorted(b - a for a, b in pairwise(times))
     seen: dict[str, Any] = {"servo_period": gaps[len(gaps) // 2], "servo_count": len(times) / count}
-    time.sleep(0.2)
+    later(receive, 0.2)
     seen |= {"servo_off": away(receive.getActualQ(), q), "servoStop": control.servoStop()}
     seen["speedL"] = control.speedL([0, 0, 0.04, 0, 0, 0], 0.5)
-    time.sleep(0.4)
+    later(receive, 0.4)
     seen |= {"tcp_speed": receive.getActualTCPSpeed(), "speedStop": control.speedStop()}
     seen["speedJ"] = control.speedJ([0.2, 0, 0, 0, 0, 0], 1.4)
-    time.sleep(0.4)
+    later(receive, 0.4)
     seen |= {"joint_speed": receive.getActualQd(), "speedStop2": control.speedStop()}
-    time.sleep(PAUSE)
+    later(receive, 0.05)
     seen["rest"] = max(map(abs, receive.getActualQd()))
     return seen
 
 
-def stops(control: Any, receive: Any, dashboard: Any) -> dict[str, Any]:
+def stops(control: Any, receive: Receiver, dashboard: Any) -> dict[str, Any]:
     q = receive.getActualQ()
     seen: dict[str, Any] = {"watchdog": control.setWatchdog(10.0)}
-    time.sleep(0.5)
-    seen["after_watchdog"] = control.isProgramRunning()
+    later(receive, 0.3)
+    until(lambda: not control.isProgramRunning())
+    seen["after_watchdog"] = receive.getRuntimeState()
     seen["reupload"] = control.reuploadScript()
-    time.sleep(0.3)
+    until(control.isProgramRunning)
     control.triggerProtectiveStop()
-    time.sleep(PAUSE)
+    told(receive)
     seen["stopped"] = receive.isProtectiveStopped(), receive.getSafetyMode(), dashboard.safetymode()
     seen["moveJ_stopped"] = control.moveJ(q)
     try:
@@ -144,15 +137,16 @@ def stops(control: Any, receive: Any, dashboard: Any) -> dict[str, Any]:
         seen["early_unlock"] = "done"
     except RuntimeError as error:
         seen["early_unlock"] = str(error)
-    time.sleep(1.0)
+    later(receive, UNLOCK_DELAY)
     dashboard.unlockProtectiveStop()
     dashboard.stop()
+    until(lambda: not control.isProgramRunning())
     seen["reupload2"] = control.reuploadScript()
-    time.sleep(0.4)
+    until(control.isProgramRunning)
     q[0] += 0.1
     seen |= {"recovered": control.moveJ(q, 1.0, 2.0), "recovered_off": away(told(receive).getActualQ(), q)}
     control.stopScript()
-    time.sleep(PAUSE)
+    told(receive)
     seen |= {"stop_script": receive.getRuntimeState(), "still_connected": receive.isConnected()}
     return seen
 

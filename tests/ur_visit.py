@@ -14,9 +14,8 @@ from typing import Any
 import dashboard_client
 import rtde_control
 import rtde_io
-import rtde_receive
 
-from tests.ur_tour import PAUSE, away, told
+from tests.ur_wait import Receiver, away, later, told, until
 
 TOOL = [0.0, 0.048, 0.227, -0.85, 0.0, 0.0]
 SKIPPED = ("getDigitalInState", "getDigitalOutState", "getOutputDoubleRegister", "getOutputIntRegister")
@@ -32,7 +31,7 @@ def said(ask: Callable[..., Any], *arguments: Any) -> Any:
 
 def visit(host: str) -> dict[str, Any]:
     """The answers, by what was asked."""
-    receive, io = rtde_receive.RTDEReceiveInterface(host), rtde_io.RTDEIOInterface(host)
+    receive, io = Receiver(host), rtde_io.RTDEIOInterface(host)
     dashboard = dashboard_client.DashboardClient(host)
     dashboard.connect()
     seen: dict[str, Any] = {"files": files(dashboard), "power": power(dashboard)}
@@ -64,29 +63,29 @@ def power(dashboard: Any) -> list[str]:
     return out
 
 
-def reports(receive: Any) -> dict[str, Any]:
+def reports(receive: Receiver) -> dict[str, Any]:
     """Every value that can be read, and a recording of some."""
     names = [name for name in dir(receive) if name.startswith(("get", "is")) and name not in SKIPPED]
     seen: dict[str, Any] = {"reports": {name: said(getattr(receive, name)) for name in names}}
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "record.csv"
         receive.startFileRecording(str(file), ["timestamp", "actual_q"])
-        time.sleep(0.5)
+        until(lambda: file.exists() and file.stat().st_size > 5000)
         receive.stopFileRecording()
         rows = [line.split(",") for line in file.read_text().splitlines()]
     seen["recorded"] = [rows[0][:2], len(rows), len(rows[1])]
     return seen
 
 
-def tools(control: Any, receive: Any) -> dict[str, Any]:
+def tools(control: Any, receive: Receiver) -> dict[str, Any]:
     seen: dict[str, Any] = {"setTcp": control.setTcp(TOOL)}
-    time.sleep(PAUSE)
+    told(receive)
     q, pose = receive.getActualQ(), receive.getActualTCPPose()
     seen |= {"fk": [away(fk, pose) for fk in (control.getForwardKinematics(), control.getForwardKinematics(q, TOOL))]}
     seen["pose_trans"] = control.poseTrans([0.1, 0.2, 0.3, 0, 0, 1.5707963], [0.1, 0, 0, 0, 0, 0])
-    control.getActualToolFlangePose()  # returns before the answer is there
-    time.sleep(PAUSE)
-    seen["flange"] = [control.getActualToolFlangePose(), control.getForwardKinematics(q, [1e-12, 0, 0, 0, 0, 0])]
+    flange = control.getForwardKinematics(q, [1e-12, 0, 0, 0, 0, 0])
+    until(lambda: away(control.getActualToolFlangePose()[:3], flange[:3]) < 1e-3)  # returns before the answer is there
+    seen["flange"] = [control.getActualToolFlangePose(), flange]
     asked = (control.zeroFtSensor, control.teachMode, control.endTeachMode, control.freedriveMode, control.endFreedriveMode)
     seen["plain"] = [ask() for ask in asked]
     seen["plain"] += [control.setGravity([0, 0, 9.82]), control.setExternalForceTorque([0.0] * 6), control.forceModeStop()]
@@ -94,22 +93,23 @@ def tools(control: Any, receive: Any) -> dict[str, Any]:
     return seen
 
 
-def signals(control: Any, io: Any, receive: Any) -> dict[str, Any]:
-    io.setConfigurableDigitalOut(2, True)
+def signals(control: Any, io: Any, receive: Receiver) -> dict[str, Any]:
     io.setInputIntRegister(19, -7)
     io.setInputDoubleRegister(20, 2.5)
-    time.sleep(PAUSE)
+    io.setConfigurableDigitalOut(2, True)
+    until(lambda: receive.getDigitalOutState(10))  # and what was sent before it has come too
     body = "  write_output_integer_register(13, read_input_integer_register(19))\n"
     body += "  write_output_float_register(14, read_input_float_register(20))\n"
     seen: dict[str, Any] = {"custom": control.sendCustomScriptFunction("copy_registers", body)}
     script = "def job():\n  set_standard_digital_out(5, True)\n  write_output_integer_register(0, 2)\nend\n"
     seen["custom2"] = control.sendCustomScript(script)
-    time.sleep(PAUSE)
+    until(lambda: receive.getDigitalOutState(5) and receive.getOutputIntRegister(13) == -7)
+    until(control.isProgramRunning)
     seen["copied"] = receive.getOutputIntRegister(13), receive.getOutputDoubleRegister(14)
     return seen | {"outs": [receive.getDigitalOutState(n) for n in (5, 10, 11)], "after_custom": control.isProgramRunning()}
 
 
-def streams(control: Any, receive: Any, period: float) -> dict[str, Any]:
+def streams(control: Any, receive: Receiver, period: float) -> dict[str, Any]:
     """servoL, speeds for a time, jogging in two frames, and watchdogs that are fed."""
     start = receive.getActualTCPPose()
     pose = list(start)
@@ -118,24 +118,26 @@ def streams(control: Any, receive: Any, period: float) -> dict[str, Any]:
         pose[2] = start[2] + 0.05 * k * period
         control.servoL(pose, 0, 0, period, 0.05, 300)
         control.waitPeriod(began)
-    time.sleep(0.3)
+    later(receive, 0.3)
     seen: dict[str, Any] = {"servoL_off": away(receive.getActualTCPPose()[:3], pose[:3]), "servoL_stop": control.servoStop()}
     seen["jogs"] = []
     for feature in (0, 1):
         control.jogStart([0.0, 0.0, 0.02, 0.0, 0.0, 0.0], feature)
-        time.sleep(0.4)
+        later(receive, 0.4)
         seen["jogs"].append((receive.getActualTCPSpeed(), receive.getActualTCPPose()))
         control.jogStop()
-    seen["watchdog"] = control.setWatchdog(2.0)
-    for _ in range(4):
-        time.sleep(0.25)
+    seen["watchdog"] = control.setWatchdog(1.0)
+    end = time.monotonic() + 1.5
+    while time.monotonic() < end:
+        time.sleep(0.05)
         control.kickWatchdog()
     return seen | {"fed": control.isProgramRunning(), "reupload": control.reuploadScript()}
 
 
-def paths(control: Any, receive: Any) -> dict[str, Any]:
+def paths(control: Any, receive: Receiver) -> dict[str, Any]:
     """A path with blends of mixed moves, and asynchronous ones told by their progress."""
-    time.sleep(0.4)
+    later(receive, 0.1)
+    until(control.isProgramRunning)
     q = receive.getActualQ()
     other = [q[0] + 0.15, *q[1:]]
     path = rtde_control.Path()
@@ -144,23 +146,22 @@ def paths(control: Any, receive: Any) -> dict[str, Any]:
             rtde_control.PathEntry(rtde_control.PathEntry.MoveJ, rtde_control.PathEntry.PositionJoints, [*target, 1.0, 2.0, 0.0])
         )
     seen: dict[str, Any] = {"movePath": control.movePath(path, False), "movePath_off": away(told(receive).getActualQ(), q)}
-    control.moveJ([[*other, 1.0, 2.0, 0.01], [*q, 1.0, 2.0, 0.0]], True)
-    progress, end = [], time.monotonic() + 6
-    while time.monotonic() < end and (not progress or progress[-1] >= 0):
-        progress.append(control.getAsyncOperationProgress())
-        time.sleep(0.02)
+    control.moveJ([[*other, 0.2, 2.0, 0.01], [*q, 0.2, 2.0, 0.0]], True)
+    until(lambda: control.getAsyncOperationProgress() >= 0)
+    progress: list[int] = []
+    until(lambda: progress.append(control.getAsyncOperationProgress()) or progress[-1] < 0)
     seen |= {"progress": sorted(set(progress)), "path_off": away(told(receive).getActualQ(), q)}
     pose = receive.getActualTCPPose()
     pose[2] += 0.05
-    control.moveL(pose, 0.05, 1.0, True)
-    time.sleep(0.3)
+    control.moveL(pose, 0.02, 1.0, True)
+    until(lambda: pose[2] - receive.getActualTCPPose()[2] < 0.045)
     control.stopL(10.0)
-    time.sleep(PAUSE)
+    later(receive, 0.05)
     left = pose[2] - receive.getActualTCPPose()[2]
     return seen | {"stopL_left": left, "stopL_speed": max(map(abs, receive.getActualQd()))}
 
 
-def refusals(control: Any, receive: Any) -> dict[str, Any]:
+def refusals(control: Any, receive: Receiver) -> dict[str, Any]:
     """What a controller cannot do: the call returns, the program has ended, and the next one works."""
     q, seen = receive.getActualQ(), {}
     asked: dict[str, Callable[[], Any]] = {
@@ -173,10 +174,9 @@ def refusals(control: Any, receive: Any) -> dict[str, Any]:
         began = time.monotonic()
         answer = said(ask)
         took = time.monotonic() - began
-        time.sleep(PAUSE)
-        ended = not control.isProgramRunning()
+        ended = until(lambda: not control.isProgramRunning())
         control.reuploadScript()
-        time.sleep(0.4)
+        until(control.isProgramRunning)
         seen[name] = {"answer": answer, "took": took, "ended": ended, "again": control.moveJ(receive.getActualQ())}
     return {"refused": seen, "has_ik": control.getInverseKinematicsHasSolution([3.0, 0, 0, 0, 0, 0])}
 

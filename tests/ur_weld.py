@@ -17,7 +17,7 @@ def weld(host: str, period: float) -> None:
     receive, io = rtde_receive.RTDEReceiveInterface(host), rtde_io.RTDEIOInterface(host)
     q = receive.getActualQ()
     start = q[0]
-    control.setWatchdog(10.0)
+    control.setWatchdog(6.0)  # as weldsim's own client
     io.setStandardDigitalOut(0, True)
     began = time.perf_counter()
     told = False

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.arm_worlds import bare_model
+from tests.machine import unless_held_up
 from tests.torch_paths import START
 from tests.ur_robots import controlled, ur_robot
 from weldsim.errors import ExecutionError
@@ -77,6 +78,7 @@ def test_facts_are_those_of_our_arm_and_mount(robot: Robot) -> None:
         assert np.abs(facts.dh - DH).max() < 1e-12
 
 
+@unless_held_up
 def test_state_is_consistent_and_moves_with_time(robot: Robot) -> None:
     with robot:
         before = robot.state()
@@ -89,6 +91,7 @@ def test_state_is_consistent_and_moves_with_time(robot: Robot) -> None:
         assert np.abs(reached.R - after.X_BT.R).max() < 1e-5
 
 
+@unless_held_up
 def test_servo_returns_what_was_sent_and_gets_there(robot: Robot) -> None:
     with robot:
         steps = round(0.72 / robot.period)
@@ -102,6 +105,7 @@ def test_servo_returns_what_was_sent_and_gets_there(robot: Robot) -> None:
         assert np.abs(robot.state().q - START - 0.05).max() < 1e-3
 
 
+@unless_held_up
 def test_stop_drops_the_arc_and_rests_within_300_ms(robot: Robot) -> None:
     with robot:
         speed, q = SLOW if isinstance(robot, SafetyGate) else FAST, START
@@ -123,6 +127,7 @@ def test_stop_drops_the_arc_and_rests_within_300_ms(robot: Robot) -> None:
         assert np.abs(robot.state().q - where).max() < 1e-3
 
 
+@unless_held_up
 def test_leaving_the_block_drops_the_arc_even_on_an_error(robot: Robot) -> None:
     def weld_and_fail() -> None:
         with robot:

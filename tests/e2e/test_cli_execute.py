@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from tests.controllers import served
+from tests.machine import unless_held_up
 from tests.torch_paths import flat_curve, torch_path
+from tests.ur_robots import PATIENT
 from weldsim.cli import main
 from weldsim.execution.black_box import read_black_box
 from weldsim.execution.simulated import SimulatedRobot
@@ -263,12 +265,16 @@ def test_a_broken_contract_moves_nothing(
 
 
 @pytest.mark.slow
+@unless_held_up
 def test_a_controller_on_the_network_welds_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("rtde_control", reason="the extra `ur` is not installed")
     file = written(tmp_path, document())
+    patience = [word for name, value in PATIENT.items() for word in ("--set", f"execution.ur.{name}={value}")]
     with served("--profile", "cb3") as host:
-        main(["execute", file, "--robot", "ur", "--host", host, "--arc", "--out", str(tmp_path / "ur"), "--json"])
-    said = json.loads(capsys.readouterr().out)
+        main(["execute", file, "--robot", "ur", "--host", host, "--arc", "--out", str(tmp_path / "ur"), "--json", *patience])
+    out, err = capsys.readouterr()
+    assert out, err
+    said = json.loads(out)
     assert said["contract"]["kept"], said["contract"]
     assert said["moved"]
     assert said["stopped"] is None, said["stopped"]

@@ -46,7 +46,7 @@ def weldsim(tmp_path) -> Command:
 
     def run(*words: object) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-c", "import sys; from weldsim.cli import main; sys.exit(main())", *map(str, words)]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
 
     return run
 
@@ -172,7 +172,7 @@ def test_report_is_a_page_and_a_picture(weldsim, scan, tmp_path):
 def test_planning_loads_no_heavy_library(scan):
     program = "import sys; from weldsim.cli import main; main(sys.argv[1:]); print(*{m.split('.')[0] for m in sys.modules})"
     command = [sys.executable, "-c", program, "plan", str(scan / "cloud.ply")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
     assert set(done.stdout.splitlines()[-1].split()) & HEAVY == set()
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from tests.calibrations import calibrated, written
+from tests.machine import unless_held_up
 from tests.torch_paths import START
-from tests.ur_robots import controlled, ur_robot
+from tests.ur_robots import CONNECT_TIMEOUT, controlled, ur_robot
 from weldsim.cli import main
 from weldsim.controller.ask import ask
 from weldsim.execution.config import ContractConfig
@@ -23,6 +24,7 @@ def geometry(clauses: tuple[Clause, ...]) -> Clause:
     return next(clause for clause in clauses if clause.name == "arm geometry")
 
 
+@unless_held_up
 @pytest.mark.parametrize("series", ["cb3", "e"])
 def test_a_calibration_of_a_fifth_of_a_millimetre_is_kept(series: Series, tmp_path: Path) -> None:
     arm = calibrated(0.0002)
@@ -44,7 +46,8 @@ def test_a_calibration_of_three_millimetres_is_refused_before_anything_moves(
     path.write_text("".join(f"{-0.4 + 0.002 * k:.3f},-0.3,0.1,2.2,2.2,0\n" for k in range(20)))
     with controlled("cb3", "--calibration", str(written(tmp_path, calibrated(0.003)))) as host:
         before = ask(host, {"status": True})["q"]
-        assert main(["execute", str(path), "--robot", "ur", "--host", host, "--out", str(out), "--json"]) == 1
+        words = ["execute", str(path), "--robot", "ur", "--host", host, "--out", str(out), "--json"]
+        assert main([*words, "--set", f"execution.ur.connect_timeout={CONNECT_TIMEOUT}"]) == 1
         said = json.loads(capsys.readouterr().out)
         assert np.abs(np.subtract(ask(host, {"status": True})["q"], before)).max() < 1e-4
         with ur_robot(host) as robot:  # who knows what it costs may have it

@@ -18,7 +18,7 @@ def seen(request: pytest.FixtureRequest) -> dict[str, Any]:
     pytest.importorskip("rtde_control", reason="the extra `ur` is not installed")
     with served("--profile", request.param, "--speed", "2") as host:
         command = [sys.executable, "-m", "tests.ur_stranger", host]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=90, env=os.environ, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=os.environ, check=False)
     assert "ANSWERS" in done.stdout, done.stdout + done.stderr
     return json.loads(done.stdout.partition("ANSWERS ")[2])
 

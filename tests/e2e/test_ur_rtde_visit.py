@@ -24,7 +24,7 @@ def seen(series: str) -> dict[str, Any]:
     pytest.importorskip("rtde_control", reason="the extra `ur` is not installed")
     with served("--profile", series) as host:
         command = [sys.executable, "-m", "tests.ur_visit", host]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=90, env=os.environ, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=os.environ, check=False)
     assert "ANSWERS" in done.stdout, done.stdout + done.stderr
     return json.loads(done.stdout.partition("ANSWERS ")[2])
 

@@ -7,13 +7,13 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.cloud_files import npy_bytes, npz_bytes, ply_bytes, text_bytes, xyz_columns
 from weldsim.cli import main
 
-FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+FEW = settings(max_examples=60)
 POINTS = np.random.default_rng(1).uniform([-0.1, 0.4, 0.0], [0.2, 0.7, 0.05], (40, 3))  # too few to plan on
 VALID = [
     *(ply_bytes(xyz_columns(POINTS, "f4"), kind) for kind in ("<", ">", "ascii")),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -74,16 +74,16 @@ def mutations(draw: st.DrawFn, valid: bytes) -> bytes:
 
 
 def is_cloud_or_one_line(read: Callable[[], object], kind: type) -> None:
-    """`read` returns a `kind` or raises a WeldsimError of one line, within a second and 60 MB."""
+    """`read` returns a `kind` or raises a WeldsimError of one line, within two seconds of processor time and 60 MB."""
     tracemalloc.start()
-    before = time.perf_counter()
+    before = time.process_time()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             result = read()
     except WeldsimError as error:
         result = error
-    elapsed, (_, peak) = time.perf_counter() - before, tracemalloc.get_traced_memory()
+    elapsed, (_, peak) = time.process_time() - before, tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert isinstance(result, kind | WeldsimError)
     assert elapsed < 2
@@ -94,9 +94,7 @@ def is_cloud_or_one_line(read: Callable[[], object], kind: type) -> None:
 
 
 EXAMPLES = int(os.environ.get("WELDSIM_FUZZ", "25"))  # a night's worth: WELDSIM_FUZZ=10000
-FUZZ = settings(
-    max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-)
+FUZZ = settings(max_examples=EXAMPLES)
 
 
 @pytest.mark.parametrize("name", VALID)
@@ -177,7 +175,7 @@ def clouds(draw: st.DrawFn) -> dict[str, np.ndarray | None]:
 
 
 @pytest.mark.parametrize(("suffix", "tolerance"), [(".ply", 0.0), (".npz", 0.0), (".xyz", 5.01e-10)])
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40)
 @given(parts=clouds())
 def test_what_is_written_reads_back(tmp_path: Path, suffix: str, tolerance: float, parts: dict) -> None:
     cloud = PointCloud(**parts)
@@ -194,7 +192,7 @@ def test_what_is_written_reads_back(tmp_path: Path, suffix: str, tolerance: floa
 
 
 @pytest.mark.parametrize("kind", ["<", ">", "ascii", "pcd ascii", "pcd binary", "pcd binary_compressed", "npy", "npz", "csv"])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(points=arrays(float, st.tuples(st.integers(1, 20), st.just(3)), elements=coordinates))
 def test_doubles_come_back_bit_for_bit_from_every_format(kind: str, points: np.ndarray) -> None:
     if kind.startswith("pcd"):
@@ -209,7 +207,7 @@ def test_doubles_come_back_bit_for_bit_from_every_format(kind: str, points: np.n
         np.testing.assert_array_equal(read_cloud(path).points, points)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.one_of(st.binary(max_size=600), st.lists(st.sampled_from([b"abcabc", b"\0" * 300, b"xyz"]), max_size=80).map(b"".join)))
 def test_lzf_unpacks_what_it_packed(data: bytes) -> None:
     assert decompress_lzf(compress_lzf(data), len(data)) == data

@@ -15,7 +15,7 @@ from weldsim.report.metrics import across, known_offsets, line_error, match_seam
 from weldsim.report.tracking import SpeedRule, speed_error, tracking_error
 
 seeds = st.integers(0, 10_000)
-few = settings(max_examples=15, deadline=None)
+few = settings(max_examples=15)
 
 
 def axes(known: KnownSeam) -> np.ndarray:

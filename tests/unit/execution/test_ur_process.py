@@ -1,17 +1,26 @@
 """The process that commands a UR controller, once it has been killed: it says so, whatever is asked of it."""
 
 import os
+import socket
+from collections.abc import Iterator
 
 import pytest
 
+from tests.controllers import free_address
 from weldsim.execution.ur_config import UrConfig
 from weldsim.execution.ur_link import client_settings
+from weldsim.execution.ur_ports import DASHBOARD, RTDE
 from weldsim.execution.ur_process import ClientError, ClientProcess
 
 
 @pytest.fixture
-def process() -> ClientProcess:
-    return ClientProcess(client_settings(UrConfig(host="127.15.0.9"), 0.008), 0.1)
+def process() -> Iterator[ClientProcess]:
+    """One that waits for a controller that accepts and says nothing: it ends by being killed alone, however late that comes."""
+    host = free_address()
+    with socket.create_server((host, DASHBOARD)), socket.create_server((host, RTDE)):
+        process = ClientProcess(client_settings(UrConfig(host=host), 0.008), 0.1)
+        yield process
+        process.kill()
 
 
 def test_a_killed_process_answers_with_one_error_alone(process: ClientProcess) -> None:

@@ -187,7 +187,7 @@ def test_seams_pass_through_the_thesis_true_points(scene: str, table: str, real_
     assert s.max() < seam.length
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     kind=st.sampled_from(("cylinder", "cuboid", "y")),
     sizes=st.lists(st.floats(-0.1, 2.5), min_size=4, max_size=4),

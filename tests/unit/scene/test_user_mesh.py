@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from weldsim.config import load_scene, structure
@@ -222,7 +222,7 @@ def test_a_scene_says_which_part_it_has(tmp_path: Path) -> None:
     assert tables == {"mesh": {"file": str(tmp_path / "a.stl"), "seam": "/b.csv"}}
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80)
 @given(content=st.one_of(st.binary(max_size=200), st.text(alphabet="0123456789.,;eE+- xyzn\n#", max_size=200).map(str.encode)))
 def test_a_seam_file_of_anything_is_read_or_refused_in_one_line(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "any.csv"

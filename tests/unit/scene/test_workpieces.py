@@ -149,7 +149,7 @@ def test_contradictions_are_refused(message: str, build: dict) -> None:
     assert "key" in caught.value.data
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(width=st.floats(0.004, 0.03), depth=st.floats(0.002, 0.018), share=st.floats(0.0, 1.0))
 def test_any_section_fits_its_sizes(width: float, depth: float, share: float) -> None:
     steepest = 2 * np.arctan(width / 2 / depth)
