@@ -5,6 +5,8 @@ SHELL := /bin/bash
 BIN := .venv/bin
 # Threads of OpenBLAS wait for each other longer than they compute on matrices as small as ours.
 export OPENBLAS_NUM_THREADS ?= 1
+# pyright would ask the network for a newer one.
+export PYRIGHT_PYTHON_IGNORE_WARNINGS ?= 1
 
 .PHONY: help set-up run test check format bench lock wheel wheel-test figures clean
 
