@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -220,7 +221,8 @@ def test_a_viewpoint_that_cannot_be_is_named(scan, capsys, where):
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("reader", ["true", "head -c 10"])
 def test_a_reader_that_goes_away_is_no_news(scan, reader, unbuffered):
-    command = f"{sys.executable} -c 'import sys; from weldsim.cli import main; sys.exit(main())' plan {scan / 'cloud.ply'} --json"
+    program = "import sys; from weldsim.cli import main; sys.exit(main())"
+    command = shlex.join([sys.executable, "-c", program, "plan", str(scan / "cloud.ply"), "--json"])
     done = subprocess.run(
         ["bash", "-c", f"{command} | {reader}; exit ${{PIPESTATUS[0]}}"],
         capture_output=True,
