@@ -36,6 +36,10 @@ TURN_FIRST, TURN_LAST = (
 JOINT_LIMIT = 2 * np.pi  # [rad] each joint, both ways
 SPEED_LIMIT = np.pi  # [rad/s] each joint
 REACH = 0.85  # [m] published; beyond it a flange pose has no solution
+ROUNDS = 12  # of Newton's method; each squares the error, and the first is some millimetres
+EXACT = 1e-10  # [m], [rad]
+STRAY = 0.5  # [rad] a joint that Newton's method moves further has left its posture: it is at a singularity
+DAMPING = 1e-12  # [m2/rad2] keeps a singular Jacobian soluble, and bends no step anywhere else
 
 
 def link_frames(q: Float[ndarray, "*batch 6"]) -> Float[ndarray, "*batch 6 4 4"]:
@@ -73,6 +77,45 @@ def dh_frames(dh: Float[ndarray, "6 4"], q: Float[ndarray, "*batch 6"]) -> Float
     out[..., 0, :, :] = np.eye(4)
     for k in range(6):
         out[..., k + 1, :, :] = out[..., k, :, :] @ T[..., k, :, :]
+    return out
+
+
+def frames_jacobian(frames: Float[ndarray, "*batch 7 4 4"], point_B: Float[ndarray, "*batch 3"]) -> Float[ndarray, "*batch 6 6"]:
+    """Geometric Jacobian in B of a point [m] of the last link: rows vx vy vz [m] and wx wy wz [rad], one column a joint.
+
+    Args:
+        frames: as `dh_frames` gives them.
+    """
+    axes, origins = frames[..., :6, :3, 2], frames[..., :6, :3, 3]
+    return np.concatenate([np.cross(axes, point_B[..., None, :] - origins), axes], axis=-1).swapaxes(-1, -2)
+
+
+def joints_at(dh: Float[ndarray, "6 4"], X_BF: Float[ndarray, "n 4 4"], q_near: Float[ndarray, "n 6"]) -> Float[ndarray, "n 6"]:
+    """Joint angles [rad] with which an arm has its flange at each pose, by Newton's method from angles that nearly do.
+
+    Row by row a smooth function of pose and angles. NaN where it does not converge, or not within STRAY: at a singularity.
+
+    Args:
+        dh: of the arm, as `DH` has them; lengths of hundreds of metres that cancel, as in a linearised calibration, do no harm.
+        q_near: angles that put it within some centimetres of the pose, those of the nominal arm say.
+    """
+    out, q, left = np.full(q_near.shape, np.nan), np.array(q_near, float), np.arange(len(q_near))
+    for _ in range(ROUNDS):
+        frames = dh_frames(dh, q[left])
+        here, wanted = frames[:, 6], X_BF[left]
+        turn = wanted[:, :3, :3] @ here[:, :3, :3].swapaxes(-1, -2)
+        # The sine of the angle, which is near zero at half a turn too: its cosine tells them apart.
+        sine = np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1) / 2
+        off = np.concatenate([wanted[:, :3, 3] - here[:, :3, 3], sine], axis=1)
+        done = (np.abs(off).max(axis=1) <= EXACT) & (np.trace(turn, axis1=1, axis2=2) > 1)
+        out[left[done]] = q[left[done]]
+        if done.all():
+            break
+        J = frames_jacobian(frames[~done], here[~done, :3, 3])
+        square = J.swapaxes(-1, -2) @ J + DAMPING * np.eye(6)
+        left = left[~done]
+        q[left] += np.linalg.solve(square, J.swapaxes(-1, -2) @ off[~done, :, None])[..., 0]
+        left = left[np.abs(q[left] - q_near[left]).max(axis=1) <= STRAY]
     return out
 
 

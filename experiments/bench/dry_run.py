@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from weldsim.arm import UR5
 from weldsim.config import load_scene
 from weldsim.curves import arc_length, tangents
 from weldsim.dryrun.cell import Cell, empty_cell, scene_cell
@@ -24,7 +25,6 @@ from weldsim.motion.config import MotionConfig
 from weldsim.motion.ladder import climb
 from weldsim.motion.rail import make_rail
 from weldsim.motion.rungs import make_rungs
-from weldsim.mounts import X_FT
 from weldsim.records import Segment, TorchPath
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -58,7 +58,7 @@ def seam(seed: int) -> TorchPath:
 def measure(path: TorchPath, cell: Cell, config: MotionConfig) -> dict[str, float]:
     """Times [s] of one seam, and whether it can be welded."""
     began = time.perf_counter()
-    climb(make_rungs(make_rail(path, config), X_FT, config, cell.collision), cell.q_start, X_FT, config, cell.collision)
+    climb(make_rungs(make_rail(path, config), UR5, config, cell.collision), cell.q_start, UR5, config, cell.collision)
     searched = time.perf_counter()
     passed = try_path(path, "seam", cell, config).passed
     return {"ladder": searched - began, "check": time.perf_counter() - searched, "passed": float(passed)}

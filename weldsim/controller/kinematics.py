@@ -9,11 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.kinematics import DH, JOINT_LIMIT, dh_frames, inverse_of_many
+from weldsim.kinematics import DH, JOINT_LIMIT, dh_frames, frames_jacobian, inverse_of_many, joints_at
 from weldsim.urscript.poses import Matrix, inverse_matrix, matrix_of, pose_of
-
-ROUNDS = 10  # of refining a solution; each squares its error, and the first is some millimetres
-EXACT = 1e-10  # [m], [rad]
 
 
 class Kinematics:
@@ -46,7 +43,10 @@ class Kinematics:
         turned = q + 2 * np.pi * np.round((start - q) / (2 * np.pi))
         turned = np.where(np.abs(turned) > JOINT_LIMIT, q, turned)
         nearest = turned[np.abs(turned - start).max(axis=1).argmin()].tolist()
-        return nearest if self._nominal else self._refined(nearest, flange)
+        if self._nominal:
+            return nearest
+        found = joints_at(self.dh, flange[None], np.array([nearest]))[0]
+        return found.tolist() if np.isfinite(found).all() else None
 
     def pose_joints(self, pose: Sequence[float], tcp: Matrix, near: Sequence[float]) -> list[float] | None:
         """`joints_near` for a pose."""
@@ -55,21 +55,4 @@ class Kinematics:
     def jacobian(self, q: Sequence[float], tcp: Matrix) -> Float[ndarray, "6 6"]:
         """Geometric Jacobian of the TCP in the base: rows vx vy vz [m] and wx wy wz [rad], one column a joint."""
         frames = dh_frames(self.dh, np.asarray(q, float))
-        tip = (frames[6] @ tcp)[:3, 3]
-        axes = frames[:6, :3, 2]
-        return np.concatenate([np.cross(axes, tip - frames[:6, :3, 3]).T, axes.T])
-
-    def _refined(self, q: Sequence[float], flange: Matrix) -> list[float] | None:
-        """The nominal arm's solution made the calibrated arm's by Newton's method; None where that does not converge."""
-        still, found = np.eye(4), np.asarray(q, float)
-        for _ in range(ROUNDS):
-            here = self.tcp_matrix(found.tolist(), still)
-            turn = pose_of(flange @ inverse_matrix(here))[3:]
-            off = np.concatenate([flange[:3, 3] - here[:3, 3], turn])
-            if np.abs(off).max() <= EXACT:
-                return found.tolist()
-            try:
-                found = found + np.linalg.solve(self.jacobian(found.tolist(), still), off)
-            except np.linalg.LinAlgError:
-                return None
-        return None
+        return frames_jacobian(frames, (frames[6] @ tcp)[:3, 3])

@@ -1,12 +1,13 @@
 """The cell that a dry run is held in: a scene of the twin, or arm and table alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.arm import UR5, Arm
 from weldsim.frames import Transform
 from weldsim.motion.collision import CellCollision
 from weldsim.mounts import X_WB
@@ -19,13 +20,28 @@ FIXTURE = "fixture"  # the body that carries the part and what holds it
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cell:
-    """Attributes: name; model, compiled; collision, its check; q_start, where the arm stands [rad]; has_part."""
+    """Attributes: name; model, compiled; collision, its check; q_start, where the arm stands [rad]; has_part; arm, whose joint
+    angles model and collision take."""
 
     name: str
     model: Any
     collision: CellCollision
     q_start: Float[ndarray, "6"]
     has_part: bool
+    arm: Arm = UR5
+
+    def fitted(self, arm: Arm) -> "Cell":
+        """The cell with another arm in it, its links where that arm's joints have them; itself where it is the same.
+
+        Args:
+            arm: with the torch of this one.
+        """
+        if (arm.dh == self.arm.dh).all():
+            return self
+        from weldsim.scene.fitted import fitted_model
+
+        model = fitted_model(self.model, arm)
+        return replace(self, model=model, collision=CellCollision(model), arm=arm)
 
     def moved(self, move: Float[ndarray, "3"]) -> "Cell":
         """A cell with the part and its fixture moved in B [m]; itself where there is no part."""
@@ -37,7 +53,7 @@ class Cell:
         # On top of where the cell's own model has it.
         body = model.body(FIXTURE).id
         model.body_pos[body] = self.model.body_pos[body] + X_WB.R @ move
-        return Cell(name=self.name, model=model, collision=CellCollision(model), q_start=self.q_start, has_part=True)
+        return replace(self, model=model, collision=CellCollision(model))
 
     def without(self, body: str) -> "Cell":
         """A cell in which every collision body whose name begins with `body` has been taken away."""
@@ -47,7 +63,7 @@ class Cell:
         for geom in range(model.ngeom):
             if model.geom(geom).name.startswith(body):
                 model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
-        return Cell(name=self.name, model=model, collision=CellCollision(model), q_start=self.q_start, has_part=self.has_part)
+        return replace(self, model=model, collision=CellCollision(model))
 
 
 def scene_cell(scene: "SceneConfig", q_start: Float[ndarray, "6"] | None = None) -> Cell:

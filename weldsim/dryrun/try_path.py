@@ -16,7 +16,6 @@ from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.motion.rail import Rail, make_rail
 from weldsim.motion.rungs import Refusal, Rungs, make_rungs, places
-from weldsim.mounts import X_FT
 from weldsim.records import TorchPath
 
 FINE = 0.001  # [m] to which the first place that fails is found
@@ -40,15 +39,15 @@ def try_path(path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Tr
         return replace(
             base, verdicts=_ended(path, _Fault(index=index, why="orientation jump", text=str(error))), p_worst=points[index]
         )
-    rungs = make_rungs(rail, X_FT, config, cell.collision)
+    rungs = make_rungs(rail, cell.arm, config, cell.collision)
     if rungs.first_refused is not None:
         found = _first_refused(rail, rungs, cell, config)
         if found is not None:
             return _refused(base, path, rail, rungs, *found)
         config = replace(config, rolls=EXACT_ROLLS)
-        rungs = make_rungs(rail, X_FT, config, cell.collision)
+        rungs = make_rungs(rail, cell.arm, config, cell.collision)
     try:
-        plan = plan_motion(path, cell.q_start, config, blocked=cell.collision, rungs=rungs)
+        plan = plan_motion(path, cell.q_start, config, cell.arm, blocked=cell.collision, rungs=rungs)
     except MotionError as error:
         return _failed(base, path, error, rungs, cell)
     return _planned(base, path, plan, config)
@@ -127,9 +126,9 @@ def _first_refused(rail: Rail, rungs: Rungs, cell: Cell, config: MotionConfig) -
     for i in (i for i, refusal in enumerate(rungs.refusals) if refusal is not None):
         before = rungs.s[max(i - 1, 0)]
         s = np.unique(np.linspace(rungs.s[i], before, int((rungs.s[i] - before) / FINE) + 2)[: -1 if i else None])
-        for at, refusal in zip(s, make_rungs(rail, X_FT, config, cell.collision, at=s).refusals, strict=True):
+        for at, refusal in zip(s, make_rungs(rail, cell.arm, config, cell.collision, at=s).refusals, strict=True):
             if refusal is not None and rail.roll_free:
-                refusal = make_rungs(rail, X_FT, exact, cell.collision, at=np.array([at])).refusals[0]
+                refusal = make_rungs(rail, cell.arm, exact, cell.collision, at=np.array([at])).refusals[0]
             if refusal is not None:
                 return float(at), refusal
     return None
@@ -234,7 +233,7 @@ def quick(
     # Its ends first, and where it failed before: most places that will not do fail there.
     suspects = [] if first is None else [first]
     coarse = replace(config, rolls=min(config.rolls, COARSE_ROLLS), clearance=0.0)
-    if make_rungs(rail, X_FT, coarse, blocked, at=np.unique([rail.s[0], rail.s[-1], *suspects])).first_refused is not None:
+    if make_rungs(rail, cell.arm, coarse, blocked, at=np.unique([rail.s[0], rail.s[-1], *suspects])).first_refused is not None:
         return False
-    rungs = make_rungs(rail, X_FT, coarse, blocked, at=places(rail, length, turn))
-    return rungs.first_refused is None and climb(rungs, cell.q_start, X_FT, config) is not None
+    rungs = make_rungs(rail, cell.arm, coarse, blocked, at=places(rail, length, turn))
+    return rungs.first_refused is None and climb(rungs, cell.q_start, cell.arm, config) is not None

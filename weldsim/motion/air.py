@@ -6,9 +6,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.arm import Arm
 from weldsim.errors import UnreachableError
 from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_LIMIT, inverse_near, torch_pose
+from weldsim.kinematics import JOINT_LIMIT
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import LostPathError
 from weldsim.motion.roam import roam
@@ -24,7 +25,7 @@ def air_moves(
     q_home: Float[ndarray, "6"],
     q_rail: Float[ndarray, "6"],
     s: float,
-    X_FT: Transform,
+    arm: Arm,
     config: MotionConfig,
     blocked: Blocked | None,
     back: bool = False,
@@ -41,7 +42,7 @@ def air_moves(
     for lift in LIFTS:
         stops = [q_home, q_rail]
         if lift > 0:
-            lifted = _lifted(q_rail, lift, X_FT)
+            lifted = _lifted(q_rail, lift, arm)
             if lifted is None:
                 continue
             stops.insert(1, lifted)
@@ -51,13 +52,13 @@ def air_moves(
             None if blocked is None else next((t for a, b in pairwise(stops) if (t := touched(a, b, blocked)) is not None), None)
         )
         if found is None:
-            return [air_move(a, b, s, config, X_FT) for a, b in pairwise(stops)]
+            return [air_move(a, b, s, config, arm) for a, b in pairwise(stops)]
         touch = touch or found
     if (
         blocked is not None
         and (corners := roam(*((q_rail, q_home) if back else (q_home, q_rail)), blocked, tries=ROAMS)) is not None
     ):
-        return [air_move(a, b, s, config, X_FT) for a, b in pairwise(corners)]
+        return [air_move(a, b, s, config, arm) for a, b in pairwise(corners)]
     ends = np.stack((q_rail, q_home) if back else (q_home, q_rail))
     straight = None if blocked is None else first_touch(ends, blocked)
     raise LostPathError(
@@ -68,11 +69,11 @@ def air_moves(
     )
 
 
-def _lifted(q: Float[ndarray, "6"], lift: float, X_FT: Transform) -> Float[ndarray, "6"] | None:
+def _lifted(q: Float[ndarray, "6"], lift: float, arm: Arm) -> Float[ndarray, "6"] | None:
     """Joint angles with the torch `lift` [m] back along the wire, in the same branch; None where there are none."""
-    X_BT = torch_pose(q, X_FT)
+    X_BT = arm.torch_pose(q)
     try:
-        lifted = inverse_near(Transform("BT", X_BT.R, X_BT.p - lift * X_BT.R[:, 2]) @ X_FT.inverse(), q)
+        lifted = arm.inverse_near(Transform("BT", X_BT.R, X_BT.p - lift * X_BT.R[:, 2]) @ arm.X_FT.inverse(), q)
     except UnreachableError:
         return None
     return lifted if np.abs(lifted - q).max() < HOP and np.abs(lifted).max() <= JOINT_LIMIT else None

@@ -4,11 +4,14 @@ Everything is expressed in the controller's base B and built from the same Denav
 `weldsim.kinematics`, so that a solved pose and a checked pose agree to rounding.
 """
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.arm import UR5, Arm
 from weldsim.frames import Transform
 from weldsim.kinematics import ALPHA, JOINT_LIMIT, JOINT_NAMES, A, D, link_frames
 from weldsim.mounts import X_FC, X_FT
@@ -18,31 +21,53 @@ UPPER_ARM_OFFSET = 0.136  # [m] of the upper arm's centre line from the shoulder
 FOREARM_OFFSET = 0.016  # [m] of the forearm's centre line, likewise
 
 
-def kinematic_model(X_FT: Transform = X_FT) -> mujoco.MjModel:
+def kinematic_model(arm: Arm = UR5) -> mujoco.MjModel:
     """Six hinges and a site at the torch tip, rooted in B; masses are dummies."""
     spec = mujoco.MjSpec()
     body = spec.worldbody
-    for i, name in enumerate(JOINT_NAMES):
-        # Modified DH: Rx(alpha) Tx(a) before the joint, Tz(d) after it; turning about z and moving along z commute.
-        c, s = np.cos(ALPHA[i]), np.sin(ALPHA[i])
+    for name, hinge in zip(JOINT_NAMES, _nominal_hinges() if arm.nominal else _own_hinges(arm), strict=True):
         body = body.add_body(
-            name=name,
-            pos=[A[i], -s * D[i], c * D[i]],
-            quat=[np.cos(ALPHA[i] / 2), np.sin(ALPHA[i] / 2), 0.0, 0.0],
-            mass=1.0,
-            inertia=[0.01, 0.01, 0.01],
-            explicitinertial=True,
+            name=name, pos=hinge.p, quat=hinge.quaternion, mass=1.0, inertia=[0.01, 0.01, 0.01], explicitinertial=True
         )
         body.add_joint(
             name=name,
             type=mujoco.mjtJoint.mjJNT_HINGE,
-            axis=[0.0, 0.0, 1.0],
+            pos=hinge.anchor,
+            axis=hinge.axis,
             limited=mujoco.mjtLimited.mjLIMITED_TRUE,
             range=[-JOINT_LIMIT, JOINT_LIMIT],
         )
-    body.add_site(name=TORCH_SITE, pos=X_FT.p, quat=X_FT.quaternion)
+    X_LT = arm.X_FT if arm.nominal else arm.torch_pose(np.zeros(6))
+    body.add_site(name=TORCH_SITE, pos=X_LT.p, quat=X_LT.quaternion)
     spec.compiler.degree = False
     return spec.compile()
+
+
+class _Hinge(NamedTuple):
+    """A link and its joint. Attributes: p [m], quaternion wxyz, of the link in the one before, all joints at zero; anchor [m],
+    axis, of the joint in the link."""
+
+    p: list[float]
+    quaternion: list[float]
+    anchor: list[float]
+    axis: list[float]
+
+
+def _nominal_hinges() -> list[_Hinge]:
+    """Modified DH: Rx(alpha) Tx(a) before the joint, Tz(d) after it; turning about z and moving along z commute."""
+    out = []
+    for alpha, a, d in zip(ALPHA, A, D, strict=True):
+        turn = [np.cos(alpha / 2), np.sin(alpha / 2), 0.0, 0.0]
+        out.append(_Hinge([a, -np.sin(alpha) * d, np.cos(alpha) * d], turn, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
+    return out
+
+
+def _own_hinges(arm: Arm) -> list[_Hinge]:
+    """All links have their frame in B when the joints are at zero: the frames of DH figures may lie hundreds of metres away."""
+    return [
+        _Hinge([0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], point.tolist(), axis.tolist())
+        for point, axis in zip(*arm.axes(), strict=True)
+    ]
 
 
 def jacobian(q: Float[ndarray, "n 6"], X_FT: Transform = X_FT) -> Float[ndarray, "n 6 6"]:

@@ -10,9 +10,9 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.interpolate import CubicSpline
 
+from weldsim.arm import Arm
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
-from weldsim.kinematics import torch_pose
 from weldsim.motion.arm import TORCH_SITE
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rail import Rail
@@ -107,7 +107,7 @@ def follow(
     q_first: Float[ndarray, "6"],
     posture: Rest,
     model: mujoco.MjModel,
-    X_FT: Transform,
+    arm: Arm,
     config: MotionConfig,
 ) -> list[JointPath]:
     """One joint path per piece of the rail, each keeping the tip on it and the wire along its z.
@@ -115,19 +115,20 @@ def follow(
     Args:
         q_first: where the iteration starts, near a solution of the first pose [rad].
         posture: what the free rotation about the wire is drawn to [rad], everywhere or as a function of arc length.
+        model: `kinematic_model` of the arm.  arm: that follows.
     Raises:
         LostPathError: no solution in this posture, a branch flip, or a spline that will not settle.
     """
     solver = _Solver(model, posture, rail.roll_free, config)
     paths, q = [], q_first
     for piece in rail.pieces():
-        paths.append(_follow_piece(solver, rail, piece, q, X_FT))
+        paths.append(_follow_piece(solver, rail, piece, q, arm))
         q = paths[-1].spline(piece[2])
     return paths
 
 
 def _follow_piece(
-    solver: _Solver, rail: Rail, piece: tuple[Segment, float, float], q_first: Float[ndarray, "6"], X_FT: Transform
+    solver: _Solver, rail: Rail, piece: tuple[Segment, float, float], q_first: Float[ndarray, "6"], arm: Arm
 ) -> JointPath:
     """Poses solved every `config.grid` and joined by a cubic spline; the grid is halved where the spline's tip strays."""
     config, (segment, start, end) = solver.config, piece
@@ -140,7 +141,7 @@ def _follow_piece(
     while True:
         _refuse_flips(s, q, config)
         spline = CubicSpline(s, q)
-        coarse, distance, angle = _strayed(rail, spline, s, X_FT, config)
+        coarse, distance, angle = _strayed(rail, spline, s, arm, config)
         if len(coarse) == 0:
             return JointPath(segment=segment, spline=spline, position_error=distance, axis_error=angle, solved=len(s))
         middle = (s[coarse] + s[coarse + 1]) / 2
@@ -171,11 +172,11 @@ def check_clear(paths: list[JointPath], blocked: Blocked) -> None:
 
 
 def _strayed(
-    rail: Rail, spline: CubicSpline, s: Float[ndarray, "n"], X_FT: Transform, config: MotionConfig
+    rail: Rail, spline: CubicSpline, s: Float[ndarray, "n"], arm: Arm, config: MotionConfig
 ) -> tuple[ndarray, float, float]:
     """Indices of the grid intervals in which the spline's tip leaves the rail, with the greatest distance and angle."""
     between = (s[:-1, None] + np.diff(s)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
-    reached, asked = torch_pose(spline(between), X_FT), rail.at(between)
+    reached, asked = arm.torch_pose(spline(between)), rail.at(between)
     distance = np.linalg.norm(reached.p - asked.p, axis=1).reshape(-1, 3).max(axis=1)
     angle = _angle(reached.R[..., 2], asked.R[..., 2]).reshape(-1, 3).max(axis=1)
     coarse = np.flatnonzero((distance > config.spline_tolerance) | (angle > config.axis_tolerance))

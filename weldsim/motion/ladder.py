@@ -16,8 +16,9 @@ from numpy import ndarray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
+from weldsim.arm import Arm
 from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_LIMIT, inverse
+from weldsim.kinematics import JOINT_LIMIT
 from weldsim.motion.collision import Touch
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rungs import Rungs, branch_of, turned
@@ -71,7 +72,7 @@ class _Climb:
 def climb(
     rungs: Rungs,
     q_start: Float[ndarray, "6"],
-    X_FT: Transform,
+    arm: Arm,
     config: MotionConfig,
     blocked: Blocked | None = None,
     banned: Bool[ndarray, "w r 8"] | None = None,
@@ -79,7 +80,7 @@ def climb(
     """The cheapest climb from the first rung to the last, or None where there is none.
 
     Args:
-        q_start: where the arm comes from [rad].  banned: nodes that have been seen not to do.
+        q_start: where the arm comes from [rad].  arm: which one.  banned: nodes that have been seen not to do.
     """
     limit = JOINT_LIMIT - config.limit_margin
     cost = rungs.cost if banned is None else np.where(banned, np.inf, rungs.cost)
@@ -87,7 +88,7 @@ def climb(
     if found is None:
         return None
     q, roll, branch, best = found
-    q, roll = _smoothed(rungs, q, roll, branch, X_FT, limit, blocked)
+    q, roll = _smoothed(rungs, q, roll, branch, arm, limit, blocked)
     return Hold(s=rungs.s, q=q, roll=roll, branch=branch, cost=best, rest=CubicSpline(rungs.s, q))
 
 
@@ -303,19 +304,19 @@ def _smoothed(
     q: Float[ndarray, "w 6"],
     roll: Float[ndarray, "w"],
     branch: int,
-    X_FT: Transform,
+    arm: Arm,
     limit: float,
     blocked: Blocked | None,
 ) -> tuple[Float[ndarray, "w 6"], Float[ndarray, "w"]]:
     """The way with its steps of rotation about the wire smoothed as far as it stays clear, solved again in the same branch."""
     if np.ptp(roll) == 0:
         return q, roll
-    X_TF = X_FT.inverse()
+    X_TF = arm.X_FT.inverse()
     for width in SMOOTHINGS[:-1]:
         soft = gaussian_filter1d(roll, width, mode="nearest")
         out = np.empty_like(q)
         for i in range(len(q)):
-            solutions = inverse(Transform("BT", turned(rungs.frames[i], float(soft[i])), rungs.p[i]) @ X_TF)
+            solutions = arm.inverse(Transform("BT", turned(rungs.frames[i], float(soft[i])), rungs.p[i]) @ X_TF)
             mine = np.flatnonzero(branch_of(solutions) == branch) if len(solutions) else []
             if len(mine) == 0:
                 break

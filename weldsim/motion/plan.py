@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.arm import UR5, Arm
 from weldsim.errors import MotionError
-from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
 from weldsim.motion.air import air_moves
 from weldsim.motion.arm import clearances, dexterity, kinematic_model
@@ -20,7 +20,6 @@ from weldsim.motion.refuse import refused, unreachable
 from weldsim.motion.rungs import Rungs, make_rungs
 from weldsim.motion.sweep import Blocked
 from weldsim.motion.timing import Move, piece_move
-from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import JointTrajectory, Segment, TorchPath
 
 LONG_RAMP = 0.002  # [m] a ramp worth a note
@@ -60,7 +59,7 @@ def plan_motion(
     path: TorchPath,
     q_start: Float[ndarray, "6"],
     config: MotionConfig | None = None,
-    X_FT: Transform = NOMINAL_X_FT,
+    arm: Arm = UR5,
     blocked: Blocked | None = None,
     rungs: Rungs | None = None,
 ) -> MotionPlan:
@@ -72,7 +71,7 @@ def plan_motion(
     Args:
         path: torch poses; leads are added along the wire where it has none.
         q_start: joint angles at t = 0 [rad].
-        X_FT: flange to torch tip.
+        arm: that welds, with its torch: the joint angles are its own, `blocked` takes them.
         rungs: of the path's own rail with the same settings, where they have been made already.
         blocked: names what a configuration touches, or None (`CellCollision`); nothing planned then touches anything, as
             far as samples of the motion show. Without it only the arm's centre lines are kept clear of table and torch.
@@ -86,7 +85,7 @@ def plan_motion(
         joint = int(np.flatnonzero(~inside)[0])
         raise MotionError(f"start: {JOINT_NAMES[joint]} at {np.rad2deg(q_start[joint]):.0f} deg (limit +-360 deg)", joint=joint)
     try:
-        return _in_one(path, q_start, q_start if config.return_home else None, config, X_FT, blocked, rungs)
+        return _in_one(path, q_start, q_start if config.return_home else None, config, arm, blocked, rungs)
     except MotionError as error:
         split = error.data.get("split")
         if not isinstance(split, tuple) or not split:
@@ -95,7 +94,7 @@ def plan_motion(
         if len(split) >= config.pieces:
             raise MotionError(f"{error}; weld it {pieces} (motion.pieces = {len(split) + 1})", **error.data) from None
         try:
-            return _in_pieces(path, split, q_start, config, X_FT, blocked)
+            return _in_pieces(path, split, q_start, config, arm, blocked)
         except MotionError as second:
             why = f"{second.data.get('reason', second)} at s = {1e3 * float(str(second.data.get('s', 0.0))):.1f} mm"
             raise MotionError(f"{error}; nor does it go {pieces}: {why}", **{**error.data, "split": ()}) from None
@@ -106,14 +105,14 @@ def _in_pieces(
     split: tuple[float, ...],
     q_start: Float[ndarray, "6"],
     config: MotionConfig,
-    X_FT: Transform,
+    arm: Arm,
     blocked: Blocked | None,
 ) -> MotionPlan:
     """The plan of a path cut at arc lengths `split` [m], one piece after the other."""
     plans, q, pieces = [], q_start, cut_path(path, split)
     for piece in pieces:
         home = q_start if config.return_home and piece is pieces[-1] else None
-        plans.append(_in_one(piece, q, home, config, X_FT, blocked))
+        plans.append(_in_one(piece, q, home, config, arm, blocked))
         q = plans[-1].trajectory.q[-1]
     slowest = min(plans, key=lambda plan: plan.slowest)
     where = ", ".join(f"{1e3 * s:.0f}" for s in split)
@@ -139,15 +138,15 @@ def _in_one(
     q_start: Float[ndarray, "6"],
     q_home: Float[ndarray, "6"] | None,
     config: MotionConfig,
-    X_FT: Transform,
+    arm: Arm,
     blocked: Blocked | None,
     rungs: Rungs | None = None,
 ) -> MotionPlan:
     """The plan of a path in a single sweep, from q_start and in the end to q_home, where that is given."""
     rail = make_rail(path, config)
-    hold, paths, moves = _first_that_holds(rail, q_start, q_home, X_FT, config, blocked, rungs)
+    hold, paths, moves = _first_that_holds(rail, q_start, q_home, arm, config, blocked, rungs)
     q = np.concatenate([path.spline(path.spline.x) for path in paths])
-    clearance = float(clearances(q, config.floor, X_FT).min())
+    clearance = float(clearances(q, config.floor, arm.X_FT).min())
     weld = next(move for move in moves if move.segment == Segment.WELD)
     slowest, notes = weld.slowest, []
     if slowest < 0.999:
@@ -166,7 +165,7 @@ def _in_one(
         slowest=slowest,
         slowest_at=weld.slowest_at,
         ramp=weld.ramp,
-        dexterity=float(dexterity(q, X_FT).min()),
+        dexterity=float(dexterity(q, arm.X_FT).min()),
         clearance=clearance,
         roll=float(hold.roll[0]),
         notes=tuple(notes),
@@ -177,7 +176,7 @@ def _first_that_holds(
     rail: Rail,
     q_start: Float[ndarray, "6"],
     q_home: Float[ndarray, "6"] | None,
-    X_FT: Transform,
+    arm: Arm,
     config: MotionConfig,
     blocked: Blocked | None,
     rungs: Rungs | None,
@@ -188,23 +187,23 @@ def _first_that_holds(
     """
     if blocked is not None and (touch := blocked(q_start)) is not None:
         raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch, why="stale start")
-    rungs, model = rungs or make_rungs(rail, X_FT, config, blocked), kinematic_model(X_FT)
+    rungs, model = rungs or make_rungs(rail, arm, config, blocked), kinematic_model(arm)
     banned = np.zeros(rungs.cost.shape, bool)
     lost: list[LostPathError] = []
     for attempt in range(config.candidates):
-        hold = climb(rungs, q_start, X_FT, config, blocked, banned)
+        hold = climb(rungs, q_start, arm, config, blocked, banned)
         if hold is None:
             break
         try:
-            paths = follow(rail, hold.q[0], hold.rest, model, X_FT, config)
+            paths = follow(rail, hold.q[0], hold.rest, model, arm, config)
             if blocked is not None:
                 check_clear(paths, blocked)
-            return hold, paths, _moves(rail, paths, q_start, q_home, X_FT, config, blocked)
+            return hold, paths, _moves(rail, paths, q_start, q_home, arm, config, blocked)
         except LostPathError as error:
             lost.append(error)
             banned |= near(rungs, hold, float(str(error.data["s"])), reach=1 + attempt)
     if not lost:
-        raise refused(rail, rungs, X_FT, config)
+        raise refused(rail, rungs, arm, config)
     furthest = max(lost, key=lambda error: float(str(error.data["s"])))
     s, reason = float(str(furthest.data["s"])), str(furthest.data["reason"])
     if reason == "out of reach":
@@ -226,15 +225,15 @@ def _moves(
     paths: list[JointPath],
     q_start: Float[ndarray, "6"],
     q_home: Float[ndarray, "6"] | None,
-    X_FT: Transform,
+    arm: Arm,
     config: MotionConfig,
     blocked: Blocked | None,
 ) -> list[Move]:
     """Air, lead-in, weld, lead-out, air."""
     moves = [piece_move(rail, piece, config) for piece in paths]
     first, last = moves[0], moves[-1]
-    there = air_moves(q_start, first.q[0], float(first.s[0]), X_FT, config, blocked)
-    home = [] if q_home is None else air_moves(q_home, last.q[-1], float(last.s[-1]), X_FT, config, blocked, back=True)
+    there = air_moves(q_start, first.q[0], float(first.s[0]), arm, config, blocked)
+    home = [] if q_home is None else air_moves(q_home, last.q[-1], float(last.s[-1]), arm, config, blocked, back=True)
     return [*there, *moves, *home]
 
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from weldsim.arm import Arm
 from weldsim.errors import MotionError, UnreachableError
 from weldsim.frames import Transform
-from weldsim.kinematics import D1, JOINT_LIMIT, JOINT_NAMES, REACH, inverse
+from weldsim.kinematics import D1, JOINT_LIMIT, JOINT_NAMES, REACH
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.ladder import break_at, cuts, least_blocked, wound_up
 from weldsim.motion.rail import Rail
@@ -13,14 +14,14 @@ from weldsim.motion.rungs import Rungs, turned
 CLOSE = 0.0005  # [m] to which the first unreachable place is found
 
 
-def refused(rail: Rail, rungs: Rungs, X_FT: Transform, config: MotionConfig) -> MotionError:
+def refused(rail: Rail, rungs: Rungs, arm: Arm, config: MotionConfig) -> MotionError:
     """The error that says why there is no climb over the rungs; `data`: index, s, reason, why, and split where a cut would help."""
     first = rungs.first_refused
     if first is None:
         return _broken(rail, rungs, JOINT_LIMIT - config.limit_margin)
     refusal, s = rungs.refusals[first], float(rungs.s[first])
     if refusal is not None and refusal.why == "unreachable":
-        return unreachable(rail, _first_unreachable(rail, float(rungs.s[max(first - 1, 0)]), s, X_FT.inverse(), config))
+        return unreachable(rail, _first_unreachable(rail, float(rungs.s[max(first - 1, 0)]), s, arm, config))
     if refusal is None or refusal.why == "singular":
         return MotionError(
             f"{where(rail, s)}: every joint solution is at a singularity; move the part or change the torch angles",
@@ -92,15 +93,15 @@ def unreachable(rail: Rail, s: float, reason: str = "no joint solution for any r
     )
 
 
-def _first_unreachable(rail: Rail, near: float, far: float, X_TF: Transform, config: MotionConfig) -> float:
+def _first_unreachable(rail: Rail, near: float, far: float, arm: Arm, config: MotionConfig) -> float:
     """The smallest arc length in [near, far] that no roll reaches, to CLOSE, given that `far` is one."""
     count = config.rolls if rail.roll_free else 1
-    low, high = near, far
+    low, high, X_TF = near, far, arm.X_FT.inverse()
     while high - low > CLOSE:
         middle = (low + high) / 2
         X_BT = rail.at(np.array([middle]))
         rolls = 2 * np.pi * np.arange(count) / count
-        if any(len(inverse((Transform("BT", turned(X_BT.R, float(roll)), X_BT.p) @ X_TF)[0])) for roll in rolls):
+        if any(len(arm.inverse((Transform("BT", turned(X_BT.R, float(roll)), X_BT.p) @ X_TF)[0])) for roll in rolls):
             low = middle
         else:
             high = middle

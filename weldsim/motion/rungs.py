@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from weldsim.arm import Arm
 from weldsim.frames import Transform
-from weldsim.kinematics import A2, A3, D5, inverse_of_many
+from weldsim.kinematics import A2, A3, D5
 from weldsim.motion.arm import clearances, dexterity
 from weldsim.motion.collision import NEAR, CellCollision, Touch
 from weldsim.motion.config import MotionConfig
@@ -74,12 +75,12 @@ class Rungs:
 
 
 def make_rungs(
-    rail: Rail, X_FT: Transform, config: MotionConfig, blocked: Blocked | None = None, at: Float[ndarray, "w"] | None = None
+    rail: Rail, arm: Arm, config: MotionConfig, blocked: Blocked | None = None, at: Float[ndarray, "w"] | None = None
 ) -> Rungs:
     """Every posture at places along the rail near enough to each other, judged.
 
     Args:
-        at: the places [m], by default at most LENGTH and TURN apart.
+        arm: whose postures.  at: the places [m], by default at most LENGTH and TURN apart.
     """
     s = places(rail) if at is None else at
     X_BT = rail.at(s)
@@ -88,9 +89,9 @@ def make_rungs(
     frames = roll_frames(X_BT) if rail.roll_free else X_BT.R
     q = np.full((len(s), count, 8, 6), np.nan)
     R, p = turned(np.repeat(frames, count, axis=0), np.tile(rolls, len(s))), np.repeat(X_BT.p, count, axis=0)
-    solutions, pose = inverse_of_many((Transform("BT", R, p) @ X_FT.inverse()).matrix)
+    solutions, pose = arm.inverse_of_many((Transform("BT", R, p) @ arm.X_FT.inverse()).matrix)
     q[pose // count, pose % count, branch_of(solutions)] = solutions
-    cost, touches = _obstacle_cost(q, _posture_cost(q, X_FT, config), blocked)
+    cost, touches = _obstacle_cost(q, _posture_cost(q, arm.X_FT, config), blocked)
     refusals = tuple(_refusal(i, q[i], cost[i], touches) for i in range(len(s)))
     return Rungs(s=s, frames=frames, p=X_BT.p, rolls=rolls, q=q, cost=cost, refusals=refusals, touches=touches)
 

@@ -10,13 +10,11 @@ import ruckig
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.arm import UR5, Arm
 from weldsim.errors import MotionError
-from weldsim.frames import Transform
-from weldsim.kinematics import torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.follow import JointPath
 from weldsim.motion.rail import Rail
-from weldsim.mounts import X_FT as NOMINAL_X_FT
 from weldsim.records import Segment
 
 BLOCK = 0.00125  # [m] a weld slows down over whole blocks of this length
@@ -64,16 +62,14 @@ def _solve(otg: ruckig.Ruckig, request: ruckig.InputParameter, dofs: int, what: 
     return trajectory
 
 
-def air_move(
-    q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config: MotionConfig, X_FT: Transform = NOMINAL_X_FT
-) -> Move:
+def air_move(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], s: float, config: MotionConfig, arm: Arm = UR5) -> Move:
     """The quickest straight joint move from q0 to q1 [rad], all joints arriving together; `s` is what it is labelled with.
 
-    Its torch tip, X_FT from the flange, keeps to `config.air_speed` where it moves furthest for each joint's radian.
+    The arm's torch tip keeps to `config.air_speed` where it moves furthest for each joint's radian.
     """
     request = ruckig.InputParameter(6)
     request.current_position, request.target_position = list(map(float, q0)), list(map(float, q1))
-    request.max_velocity = [min(config.joint_speed, config.joint_speed_limit, _joint_speed(q0, q1, X_FT, config))] * 6
+    request.max_velocity = [min(config.joint_speed, config.joint_speed_limit, _joint_speed(q0, q1, arm, config))] * 6
     request.max_acceleration = [min(config.joint_acceleration, config.joint_acceleration_limit)] * 6
     request.max_jerk = [min(config.joint_jerk, config.joint_jerk_limit)] * 6
     request.synchronization = ruckig.Synchronization.Phase
@@ -85,11 +81,11 @@ def air_move(
     return Move(segment=Segment.AIR, q=q, qd=qd, qdd=qdd, s=np.full(n, s), speed=np.zeros(n))
 
 
-def _joint_speed(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], X_FT: Transform, config: MotionConfig) -> float:
+def _joint_speed(q0: Float[ndarray, "6"], q1: Float[ndarray, "6"], arm: Arm, config: MotionConfig) -> float:
     """Speed of the leading joint [rad/s] at which the tip is nowhere faster than `config.air_speed` on the straight way."""
     furthest = float(np.abs(q1 - q0).max())
     u = np.linspace(0.0, 1.0, max(2, int(np.ceil(furthest / LOOK)) + 1))
-    p = torch_pose(q0 + u[:, None] * (q1 - q0), X_FT).p
+    p = arm.torch_pose(q0 + u[:, None] * (q1 - q0)).p
     chord = float(np.linalg.norm(np.diff(p, axis=0), axis=1).max()) * (len(u) - 1)  # [m] a whole way at the greatest rate
     return config.air_speed * furthest / max(chord * CHORD, 1e-9)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.torch_paths import START, flat_curve, torch_path
+from weldsim.arm import UR5
 from weldsim.dryrun.cell import empty_cell, scene_cell
 from weldsim.dryrun.fix import applied
 from weldsim.dryrun.program import Program
@@ -18,7 +19,6 @@ from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import plan_motion
 from weldsim.motion.rail import make_rail
 from weldsim.motion.rungs import make_rungs
-from weldsim.mounts import X_FT
 from weldsim.records import TorchPath
 from weldsim.scene.config import PartPoseConfig, SceneConfig
 
@@ -40,7 +40,7 @@ def test_the_first_place_out_of_reach_is_so_for_every_degree_of_rotation(heading
     assert trial.failure is not None
     assert trial.s_worst is not None
     rail, exact = make_rail(path, CONFIG), replace(CONFIG, rolls=360)
-    at = make_rungs(rail, X_FT, exact, cell.collision, at=np.array([trial.s_worst - 0.0012, trial.s_worst]))
+    at = make_rungs(rail, UR5, exact, cell.collision, at=np.array([trial.s_worst - 0.0012, trial.s_worst]))
     assert [refusal is None for refusal in at.refusals] == [True, False]
     assert at.refusals[1] is not None
     assert at.refusals[1].why == trial.failure.why
@@ -92,6 +92,6 @@ def test_a_part_that_stands_in_the_arm_is_named_and_moved_away() -> None:
 
 def test_rungs_made_before_are_used_as_they_are() -> None:
     path = torch_path(flat_curve("arc", 0.1) + np.array([0.0, -0.45, 0.1]), DOWN)
-    rungs = make_rungs(make_rail(path, CONFIG), X_FT, CONFIG)
+    rungs = make_rungs(make_rail(path, CONFIG), UR5, CONFIG)
     given, made = plan_motion(path, START, CONFIG, rungs=rungs), plan_motion(path, START, CONFIG)
     assert np.array_equal(given.trajectory.q, made.trajectory.q)

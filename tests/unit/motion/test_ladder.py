@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from weldsim.arm import UR5
 from weldsim.config import load_scene
 from weldsim.curves import arc_length, interpolate, tangents
 from weldsim.frames import Transform, unit
@@ -15,7 +16,6 @@ from weldsim.motion.plan import plan_motion
 from weldsim.motion.rail import make_rail
 from weldsim.motion.rungs import Rungs, branch_of, make_rungs
 from weldsim.motion.sweep import LEVERS, STEP_LENGTH, STEP_TURN, first_touch, steps, touched
-from weldsim.mounts import X_FT
 from weldsim.path.config import PathConfig
 from weldsim.path.plan import plan_path
 from weldsim.records import KnownSeam, Seam, TorchPath
@@ -47,11 +47,11 @@ def test_the_cuboid_is_welded_over_its_three_faces(world: World) -> None:
     path, blocked, config = path_along(world.known_seams[0]), CellCollision(world.model), MotionConfig()
     q_start = world.view_joints(len(world.views) - 1)
     # With one rotation about the wire there is no way.
-    rungs = make_rungs(make_rail(path, config), X_FT, config, blocked)
+    rungs = make_rungs(make_rail(path, config), UR5, config, blocked)
     for k in range(config.rolls):
         only = np.ones(rungs.cost.shape, bool)
         only[:, k] = False
-        assert climb(rungs, q_start, X_FT, config, blocked, banned=only) is None
+        assert climb(rungs, q_start, UR5, config, blocked, banned=only) is None
     plan = plan_motion(path, q_start, config, blocked=blocked)
     assert plan.position_error < 0.1e-3
     assert plan.axis_error < np.deg2rad(0.1)
@@ -92,7 +92,7 @@ def _ladder(angles: np.ndarray, cost: np.ndarray) -> Rungs:
 def test_whole_turns_are_chosen_so_that_the_stops_are_never_reached() -> None:
     # From -150 deg the joint turns on by 480 deg: it must start a whole turn lower, at -510 + 480, not at the nearest angle.
     angles = np.deg2rad(np.linspace(-150, 330, 25))[:, None]
-    hold = climb(_ladder(angles, np.zeros(angles.shape)), np.zeros(6), X_FT, MotionConfig())
+    hold = climb(_ladder(angles, np.zeros(angles.shape)), np.zeros(6), UR5, MotionConfig())
     assert hold is not None
     assert np.abs(hold.q).max() <= 2 * np.pi - 0.1
     assert np.allclose(np.diff(hold.q[:, 5]), np.deg2rad(20), atol=1e-9)
@@ -105,7 +105,7 @@ def test_a_weld_that_would_end_near_a_stop_is_begun_a_whole_turn_away(start: flo
     angles = np.deg2rad(np.full((25, 1), principal))
     q_start = np.zeros(6)
     q_start[5] = np.deg2rad(start)
-    hold = climb(_ladder(angles, np.zeros(angles.shape)), q_start, X_FT, MotionConfig())
+    hold = climb(_ladder(angles, np.zeros(angles.shape)), q_start, UR5, MotionConfig())
     assert hold is not None
     assert np.allclose(hold.q[:, 5], np.deg2rad(start + 360 * turns), atol=1e-9)
 
@@ -117,9 +117,9 @@ def test_a_joint_that_would_run_into_its_stop_goes_another_way() -> None:
     angles[:] = np.linspace(0, 5 * np.pi, w)[:, None]
     cost = np.ones((w, r))
     cost[:, 0] = 0.0
-    assert climb(_ladder(angles, cost), np.zeros(6), X_FT, MotionConfig()) is None
+    assert climb(_ladder(angles, cost), np.zeros(6), UR5, MotionConfig()) is None
     angles[:, 1:] = angles[0, 0] + 0.3 * np.sin(np.arange(w))[:, None]
-    hold = climb(_ladder(angles, cost), np.zeros(6), X_FT, MotionConfig())
+    hold = climb(_ladder(angles, cost), np.zeros(6), UR5, MotionConfig())
     assert hold is not None
     assert np.abs(hold.q).max() <= 2 * np.pi - 0.1
     assert np.abs(np.diff(hold.q, axis=0)).max() < 0.6
@@ -136,7 +136,7 @@ def test_a_weld_is_cut_where_its_pieces_are_cheapest(at: int) -> None:
     cost[8:at, 6] += 1.0
     cost[at + 1 : 31, 0] += 1.0
     rungs = _ladder(angles, cost)
-    assert climb(rungs, np.zeros(6), X_FT, MotionConfig()) is None
+    assert climb(rungs, np.zeros(6), UR5, MotionConfig()) is None
     assert cuts(rungs, LIMIT, EVERYWHERE) == [pytest.approx(0.01 * at)]
 
 
