@@ -9,6 +9,7 @@ from weldsim.frames import Transform, matrix_from_rotation_vector, unit
 from weldsim.records import Segment, TorchPath
 
 START = np.array([-1.5708, -1.9199, -1.6, -1.1, 1.5708, 0.0])  # [rad] arm up over the table, wire well above it
+OVER = np.array([-1.6, -1.36, -2.33, -0.19, 2.02, -0.4])  # [rad] wire straight down, some centimetres over (0, -0.48, 0.06) m in B
 
 
 def torch_path(

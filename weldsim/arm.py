@@ -56,21 +56,20 @@ class Arm:
 
     def inverse(self, X_BF: Transform) -> Float[ndarray, "k 6"]:
         """All joint solutions [rad] in (-pi, pi] of one flange pose; k is 0 (none) to 8."""
-        return self.inverse_of_many(X_BF.matrix[None])[0]
+        q, _ = self.inverse_of_many(X_BF.matrix[None])
+        return q[np.isfinite(q).all(axis=1)]
 
     def inverse_of_many(self, X_BF: Float[ndarray, "n 4 4"]) -> tuple[Float[ndarray, "n_k 6"], Int[ndarray, "n_k"]]:
         """All joint solutions [rad] in (-pi, pi] of many flange poses, and the pose that each is of.
 
-        A pose that the nominal arm does not reach has none, though this arm may reach a millimetre further; nor has a posture in
-        which Newton's method does not converge, at a singularity.
+        A pose that the nominal arm does not reach has none, though this arm may reach a millimetre further. NaN where the nominal
+        arm has one and Newton's method does not converge: at a singularity.
         """
         q, pose = kinematics.inverse_of_many(X_BF)
         if self.nominal:
             return q, pose
         q = joints_at(self.dh, X_BF[pose], q)
-        there = np.isfinite(q).all(axis=1)
-        q = q[there]
-        return q - 2 * np.pi * np.ceil(q / (2 * np.pi) - 0.5), pose[there]
+        return q - 2 * np.pi * np.ceil(q / (2 * np.pi) - 0.5), pose
 
     def inverse_near(self, X_BF: Transform, q_near: Float[ndarray, "6"]) -> Float[ndarray, "6"]:
         """The solution nearest to q_near [rad], each joint unwrapped by whole turns within its limits.

@@ -15,6 +15,7 @@ from weldsim.dryrun.program import Base, Tool
 from weldsim.errors import InputError, SensorError
 
 if TYPE_CHECKING:
+    from weldsim.arm import Arm
     from weldsim.dryrun.cell import Cell
     from weldsim.dryrun.verdict import DryRun, Trial, Verdict
     from weldsim.motion.config import MotionConfig
@@ -41,6 +42,10 @@ class DryRunCommand(ConfigOptions):
 
     start: str | None = None
     """Where the arm stands: six joint angles, "-90 deg, -75 deg, ..." or radians. Default: the scene's last view, or home."""
+
+    arm: Path | None = None
+    """Whose arm it is, in place of a nominal UR5: a controller's calibration.conf, or the contract.json of a run directory that
+    `weldsim execute` left, which holds what the controller told. For paths."""
 
     tool: Tool | None = None
     """Which frame the poses of a CSV or script are of: the wire's tip, or the bare flange. Default: what the file says."""
@@ -77,7 +82,7 @@ class DryRunCommand(ConfigOptions):
         check_suffix(self.out, (".json",), "a dry run")
         check_suffix(self.reach_map, (".png",), "a reach map")
         check_suffix(self.export, (".script", ".urscript"), "a program")
-        check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file))
+        check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file, self.arm))
         config, q_start = self.cell(), None if self.start is None else joint_angles(self.start)
 
         from weldsim.config import paced_for
@@ -90,6 +95,8 @@ class DryRunCommand(ConfigOptions):
         )
         if program.kind == "script" and (self.reach_map is not None or self.export is not None):
             raise InputError(f"{self.file}: --reach-map and --export are for paths; this is a robot program already")
+        if program.kind == "script" and self.arm is not None:
+            raise InputError(f"{self.file}: --arm is for paths; the joint angles of a robot program are an arm's own already")
         if self.html is not None or self.png is not None:
             choose_platform()
         with progress() as tell:
@@ -101,7 +108,7 @@ class DryRunCommand(ConfigOptions):
                 extra = {"reach_map": self._map(program.paths[0], cell, config.motion, lambda done: tell("reach map", done))}
                 written.append(self.reach_map)
             if self.export is not None and result.passed:
-                written.append(self._export(result, config.motion))
+                written.append(self._export(result, config.motion, cell))
         if self.json:
             from weldsim.dryrun.verdict import dry_run_json
 
@@ -113,7 +120,20 @@ class DryRunCommand(ConfigOptions):
     def _cell(self, q_start: Any) -> "Cell":
         from weldsim.dryrun.cell import empty_cell, scene_cell
 
-        return empty_cell(q_start) if self.scene is None else scene_cell(self.scene_of(self.scene), q_start)
+        cell = empty_cell(q_start) if self.scene is None else scene_cell(self.scene_of(self.scene), q_start)
+        return cell if self.arm is None else cell.fitted(self._arm(self.arm))
+
+    def _arm(self, file: Path) -> "Arm":
+        """The arm of a file, near enough to a nominal one."""
+        from weldsim.arm import Arm
+        from weldsim.controller.calibration import read_calibration
+        from weldsim.execution.contract import ANOTHER
+        from weldsim.welding.folder import read_told_arm
+
+        found = read_told_arm(file) if file.suffix.lower() == ".json" else Arm(dh=read_calibration(file).dh)
+        if (off := found.deviation()) > ANOTHER:
+            raise InputError(f"--arm {file}: {1e3 * off:.0f} mm from a nominal UR5 (limit {1e3 * ANOTHER:g} mm): it is another arm")
+        return found
 
     def _write(self, result: "DryRun", cell: "Cell") -> tuple[list[Path], str]:
         """What was written, and why a picture was not."""
@@ -152,7 +172,7 @@ class DryRunCommand(ConfigOptions):
         write_whole(self.reach_map, reach_picture(found, self.file.stem))  # type: ignore[arg-type] - asked for
         return reach_json(found)
 
-    def _export(self, result: "DryRun", config: "MotionConfig") -> Path:
+    def _export(self, result: "DryRun", config: "MotionConfig", cell: "Cell") -> Path:
         """All welds one after the other, each from the start and back to it."""
         from weldsim.execution.urscript import script_text
         from weldsim.output import write_whole
@@ -160,6 +180,7 @@ class DryRunCommand(ConfigOptions):
         text = script_text(
             *(trial.trajectory for trial in result.trials if trial.trajectory is not None),
             title=f"{result.source}, {', '.join(trial.name for trial in result.trials)}",
+            arm=cell.arm,
             joint_acceleration=config.joint_acceleration,
             lead_speed=config.lead_speed,
         )

@@ -152,7 +152,9 @@ class Execute(ConfigOptions):
         rows = [[c.name, c.value, c.expected, MARKS[c.passed], c.advice if c.passed is False else ""] for c in done.clauses]
         print(table(rows, ("contract", "robot", "expected", "", "")))
         if done.trial is not None and not done.trial.passed:
-            print(f"  nothing has moved: a dry run from where the arm stands fails; {self._dry_run(done)} looks for a fix")
+            print(
+                f"  nothing has moved: a dry run from where the arm stands fails; {self._dry_run(done, written[0])} looks for a fix"
+            )
             print(table(failures(done.trial), ("waypoint", "s", "verdict", "reason")))
         if done.stopped is not None:
             print(f"  {'stopped' if done.moved else 'nothing has moved'}: {done.stopped}")
@@ -174,13 +176,17 @@ class Execute(ConfigOptions):
         for path in written:
             print(f"  wrote {path}")
 
-    def _dry_run(self, done: "Job") -> str:
-        """The command that repeats a job's dry run."""
+    def _dry_run(self, done: "Job", folder: Path) -> str:
+        """The command that repeats a job's dry run. Args: folder, its run directory."""
+        from weldsim.execution.contract import own_arm
+
         scene = [] if self.scene is None else ["--scene", self.scene]
         settings = [] if self.config is None else ["--config", str(self.config)]
         settings += [word for text in self.set for word in ("--set", text)]
         start = [] if done.q_start is None else ["--start", ", ".join(f"{angle:.4f}" for angle in done.q_start)]
-        return shlex.join(["weldsim", "dry-run", str(self.file), *scene, *settings, *start])
+        own = done.facts is not None and not own_arm(done.facts).nominal
+        arm = ["--arm", str(folder / "contract.json")] if own else []
+        return shlex.join(["weldsim", "dry-run", str(self.file), *scene, *arm, *settings, *start])
 
 
 def _arc(log: "ExecutionLog", job: "JobConfig") -> str:

@@ -20,8 +20,8 @@ class ControllerConfig:
     standstill: float = 1e-3
     """Joint speed below which the arm counts as steady [rad/s]."""
     calibration: Calibration = field(default_factory=Calibration)
-    """Factory calibration of the arm: what it tells of itself, and what its poses and joint angles mean to it. Collisions are
-    judged with the nominal arm's bodies."""
+    """Factory calibration of the arm: what it tells of itself, and what its poses and joint angles mean to it, and where
+    its links are."""
 
     def __post_init__(self) -> None:
         require_within(self, {"speed": (0.01, 100.0), "unlock_delay": (0.0, 60.0), "standstill": (1e-6, 1.0)}, "controller")

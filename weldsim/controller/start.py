@@ -1,12 +1,15 @@
 """A controller from a profile and a scene, ready to be run."""
 
+from weldsim.arm import Arm as OwnArm
 from weldsim.controller.arm import Arm
+from weldsim.controller.calibration import Calibration
 from weldsim.controller.config import ControllerConfig
 from weldsim.controller.machine import Machine
 from weldsim.controller.profile import PROFILES, Series
 from weldsim.controller.server import Server
 from weldsim.scene.cell import new_arm
 from weldsim.scene.config import SceneConfig
+from weldsim.scene.fitted import fitted_model
 from weldsim.scene.quiet import keep_quiet
 from weldsim.scene.world import HOME, build_world
 
@@ -26,6 +29,8 @@ def new_machine(series: Series = "cb3", scene: SceneConfig | None = None, config
         spec = new_arm()
         spec.body("wrist_3_link").add_site(name="torch_tip")
         model, q = spec.compile(), HOME
+    if config is not None and config.calibration != Calibration():
+        model = fitted_model(model, OwnArm(dh=config.calibration.dh))
     profile = PROFILES[series]
     return Machine(profile, Arm(model, q.tolist(), profile), config)
 

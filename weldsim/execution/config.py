@@ -25,7 +25,8 @@ GATE_RANGES = {
     "memory": (0.1, 600.0),
 }
 CONTRACT_RANGES = {
-    "calibration": (1e-6, 0.1),
+    "calibration": (1e-6, 0.02),
+    "own_position": (1e-6, 0.1),
     "frame_position": (1e-6, 0.1),
     "frame_rotation": (1e-6, 0.5),
     "tcp_position": (1e-6, 0.1),
@@ -118,13 +119,16 @@ class GateConfig:
 class ContractConfig:
     """How closely a robot must be what the plan takes it for, before it moves."""
 
-    calibration: Metre = 0.001
+    calibration: Metre = 0.02
     """Greatest distance of the flange, in any of many postures, between the controller's own DH figures, factory calibration
-    included, and ours: what a weld can miss by. Two UR5s whose figures are published are 3.0 and 3.3 mm off."""
+    included, and a nominal UR5's. The plan is made with the arm's own figures; further off it is another arm. Two UR5s whose
+    figures are published are 3.0 and 3.3 mm off."""
     frame_position: Metre = 0.005
-    """Greatest distance of the reported torch tip from where our kinematics put it."""
+    """Greatest distance of the reported torch tip from where a nominal arm has it, where the robot tells no other figures."""
+    own_position: Metre = 0.0005
+    """Greatest distance of the reported torch tip from where the DH figures that the robot tells have it."""
     frame_rotation: Radian = 0.0175
-    """Greatest angle between the reported torch and where our kinematics put it (1 deg)."""
+    """Greatest angle between the reported torch and where those kinematics put it (1 deg)."""
     tcp_position: Metre = 0.0001
     """Greatest distance of the controller's tool centre point from our mount."""
     tcp_rotation: Radian = 0.00175

@@ -12,14 +12,13 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.arm import UR5, Arm
 from weldsim.errors import ExecutionError, WeldsimError
 from weldsim.execution.black_box import BlackBox, BlackBoxRow
 from weldsim.execution.config import GateConfig
 from weldsim.execution.limits import HISTORY, Breach, motion_breach, off_the_way
 from weldsim.execution.robot import Robot
-from weldsim.frames import Transform
-from weldsim.kinematics import JOINT_NAMES, torch_tip
-from weldsim.mounts import X_FT as NOMINAL_X_FT
+from weldsim.kinematics import JOINT_NAMES
 from weldsim.records import Event, JointTrajectory, RobotFacts, RobotState, Segment
 
 PASSED = 4000  # states kept for `passed_over`: 8 s at 500 Hz
@@ -31,6 +30,8 @@ class SafetyGate(Robot):
 
     Attributes:
         inner: the robot behind it.  config: the rules.  arc_permitted: whether the arc may burn at all.
+        arm: by whose kinematics the torch tip is judged, of commands and of reports alike; where the robot tells its own figures,
+            theirs (`contract.own_arm`), before anything is commanded.
         black_box: where the last one was written, or None.
     """
 
@@ -41,15 +42,15 @@ class SafetyGate(Robot):
         *,
         arc: bool = False,
         folder: Path | None = None,
-        X_FT: Transform = NOMINAL_X_FT,
+        arm: Arm = UR5,
     ) -> None:
-        """Args: inner, not yet connected; arc, permission to burn; folder, for black boxes, none where None; X_FT, the mount."""
+        """Args: inner, not yet connected; arc, permission to burn; folder, for black boxes, none where None; arm, kinematics."""
         if isinstance(inner, SafetyGate):
             raise ExecutionError(f"{inner.name}: stands behind a gate already", rule="gate")
         self.inner, self.config, self.arc_permitted = inner, config or GateConfig(), arc
         self.name, self.period = inner.name, inner.period
         self.black_box: Path | None = None
-        self._folder, self._X_FT = folder, X_FT
+        self._folder, self.arm = folder, arm
         self._events: list[Event] = []
         self._passed: deque[tuple[RobotState, bool]] = deque(maxlen=PASSED)
         self._looked: tuple[RobotState, bool] | None = None  # the newest that the gate itself has seen
@@ -152,7 +153,7 @@ class SafetyGate(Robot):
         q = np.concatenate(
             [np.repeat(trajectory.q[:1], HISTORY, axis=0), trajectory.q, np.repeat(trajectory.q[-1:], HISTORY, axis=0)]
         )
-        found = motion_breach(q, np.concatenate([rest, trajectory.qd, rest]), torch_tip(q, self._X_FT), self.period, self.config)
+        found = motion_breach(q, np.concatenate([rest, trajectory.qd, rest]), self.arm.torch_tip(q), self.period, self.config)
         if found is not None:
             row, breach = found
             i = min(row - HISTORY, len(trajectory.t) - 1)
@@ -204,11 +205,11 @@ class SafetyGate(Robot):
             bad = int((~np.isfinite(np.concatenate([q, qd]))).argmax()) % 6
             text = f"{JOINT_NAMES[bad]} is told a number that is not finite"
             self._breach(Breach(rule="command", what=JOINT_NAMES[bad], value=float("nan"), limit=0.0, text=text))
-        tip = torch_tip(q, self._X_FT)
+        tip = self.arm.torch_tip(q)
         if not self._sent:
             origin = q if self._origin is None else self._origin
             self._check_start(self._reported(), origin, moving=True)
-            self._sent.extend([(origin, np.zeros(6), torch_tip(origin, self._X_FT))] * HISTORY)
+            self._sent.extend([(origin, np.zeros(6), self.arm.torch_tip(origin))] * HISTORY)
             self._origin = None
         rows = [*self._sent, (q, qd, tip)]
         columns = [np.stack(column) for column in zip(*rows, strict=True)]
@@ -248,8 +249,8 @@ class SafetyGate(Robot):
             self._breach(Breach(rule="arc", what="arc output", value=late, limit=self.config.arc_lag, text=text))
 
     def _check_tip(self, state: RobotState) -> None:
-        # By our kinematics, as the commands are: a controller's own, calibrated, differ from them by more than an arm strays.
-        tip = torch_tip(state.q, self._X_FT)
+        # Not as reported: by the kinematics that the commands are judged by, or two calibrations would count as straying.
+        tip = self.arm.torch_tip(state.q)
         off = float(np.linalg.norm(off_the_way(tip, np.array([p for _, p in self._way]))))
         if off > self.config.tracking_tip:
             text = f"torch tip is {1e3 * off:.2f} mm off the weld (limit {1e3 * self.config.tracking_tip:.2f} mm)"

@@ -4,9 +4,10 @@ Kinematics info holds complete figures: those of the model with the calibration'
 does not say so; the comment in the manufacturer's client library does, its simulator sends a2 = -0.425 m there and no zeros, and
 figures that owners of two UR5s published (ROS driver issue 457: as sent; ros-industrial/universal_robot issue 357: corrections
 from calibration.conf, to be added) put the flange within 3.4 mm of the nominal arm's that way, though some d are hundreds of
-metres. They are taken whole. Should a controller send bare corrections after all, they make an arm that is metres off, and the
-contract refuses it. Sub-package 6, 'Configuration data', has DH figures too, in the simulator the same ones; by its name they
-are the model's, and it is not read.
+metres. They are taken whole, and welds are planned with them. Should a controller send bare corrections after all, they make an
+arm that is metres off, and the contract refuses it; it refuses other figures, too, than the controller's own pose is made with.
+Sub-package 6, 'Configuration data', has DH figures too, in the simulator the same ones; by its name they are the model's, and it
+is not read.
 
 Verified over sockets against our own virtual controller, never on a real one.
 """

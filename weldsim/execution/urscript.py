@@ -1,7 +1,9 @@
 """Planned welds as URScript: TCP, air moves, lead-in, the weld streamed at the controller's own period, arc output, lead-out.
 
 The weld is a stream of servoj targets and not a chain of movep: what a controller makes of blends is its own affair, the
-stream is the checked motion itself. Approach and lead-out are straight lines (movel), air moves straight in the joints (movej).
+stream is the checked motion itself. Its joint angles are those of the arm that was planned for: on a calibrated arm those of a
+nominal one put the torch some millimetres off. Approach and lead-out are straight lines (movel), air moves straight in the
+joints (movej).
 """
 
 from itertools import pairwise
@@ -10,9 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.frames import Transform
-from weldsim.kinematics import torch_pose
-from weldsim.mounts import X_FT as NOMINAL_X_FT
+from weldsim.arm import UR5, Arm
 from weldsim.records import JointTrajectory, Segment
 
 LOOKAHEAD, GAIN = 0.03, 300  # [s] the least a controller takes, and its own default
@@ -26,7 +26,7 @@ LEAD_ACCELERATION = 0.5  # [m/s2] of the straight lead-in and lead-out
 def script_text(
     *trajectories: JointTrajectory,
     title: str = "weldsim",
-    X_FT: Transform = NOMINAL_X_FT,
+    arm: Arm = UR5,
     arc_output: int = 0,
     joint_acceleration: float = 1.4,
     lead_speed: float = 0.1,
@@ -37,11 +37,11 @@ def script_text(
 
     Args:
         trajectories: as planned and checked, at least one; at rest where their segments meet.
-        title: of the program, in a comment.  X_FT: the TCP that is set.
+        title: of the program, in a comment.  arm: whose joint angles they are; its torch's TCP is set.
         arc_output: standard digital output that strikes the arc.
         joint_acceleration: of air moves [rad/s2], which are as fast as planned.  lead_speed: of lead-in and lead-out [m/s].
     """
-    tcp = ", ".join(f"{v:.9f}" for v in (*X_FT.p, *X_FT.rotation_vector))
+    tcp = ", ".join(f"{v:.9f}" for v in (*arm.X_FT.p, *arm.X_FT.rotation_vector))
     start = ", ".join(f"{v:.1f}" for v in np.rad2deg(trajectories[0].q[0]))
     lines = [
         f"# {' '.join(title.split())}",
@@ -67,7 +67,7 @@ def script_text(
             elif names[first] == Segment.WELD:
                 lines += _weld(trajectory, rows, arc_output)
             else:
-                X_BT = torch_pose(trajectory.q[last - 1], X_FT)
+                X_BT = arm.torch_pose(trajectory.q[last - 1])
                 pose = ", ".join(f"{v:.9f}" for v in (*X_BT.p, *X_BT.rotation_vector))
                 lines.append(f"  movel(p[{pose}], a={LEAD_ACCELERATION:g}, v={lead_speed:g})")
     return "\n".join([*lines, "end", ""])

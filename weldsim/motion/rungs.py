@@ -35,7 +35,7 @@ class Refusal:
 
     Attributes:
         why: kind.  text: for people.  options: postures tried.
-        q: the posture that comes nearest to doing [rad], None where the place is out of reach.
+        q: the posture that comes nearest to doing [rad], None where the place is out of reach or there are only lost ones.
         touch: what collides in it, where something does.
     """
 
@@ -90,9 +90,12 @@ def make_rungs(
     q = np.full((len(s), count, 8, 6), np.nan)
     R, p = turned(np.repeat(frames, count, axis=0), np.tile(rolls, len(s))), np.repeat(X_BT.p, count, axis=0)
     solutions, pose = arm.inverse_of_many((Transform("BT", R, p) @ arm.X_FT.inverse()).matrix)
+    there = np.isfinite(solutions).all(axis=1)
+    lost = np.bincount(pose[~there] // count, minlength=len(s))  # at a singularity
+    solutions, pose = solutions[there], pose[there]
     q[pose // count, pose % count, branch_of(solutions)] = solutions
     cost, touches = _obstacle_cost(q, _posture_cost(q, arm.X_FT, config), blocked)
-    refusals = tuple(_refusal(i, q[i], cost[i], touches) for i in range(len(s)))
+    refusals = tuple(_refusal(i, q[i], cost[i], touches, int(lost[i])) for i in range(len(s)))
     return Rungs(s=s, frames=frames, p=X_BT.p, rolls=rolls, q=q, cost=cost, refusals=refusals, touches=touches)
 
 
@@ -170,17 +173,17 @@ def _touch(q: Float[ndarray, "6"], blocked: Blocked) -> tuple[Touch | None, floa
 
 
 def _refusal(
-    i: int, q: Float[ndarray, "r 8 6"], cost: Float[ndarray, "r 8"], touches: Mapping[tuple[int, ...], Touch]
+    i: int, q: Float[ndarray, "r 8 6"], cost: Float[ndarray, "r 8"], touches: Mapping[tuple[int, ...], Touch], lost: int
 ) -> Refusal | None:
-    """Why no posture of one place will do, None where one will."""
+    """Why no posture of one place will do, None where one will. Args: lost, how many have no joint angles, being singular."""
     if np.isfinite(cost).any():
         return None
     there = ~np.isnan(q[..., 0])
-    if not there.any():
+    if not there.any() and not lost:
         return Refusal(why="unreachable", text="no joint solution for any rotation about the wire")
     mine = {index[1:]: touch for index, touch in touches.items() if index[0] == i}
     if mine:
         index, touch = min(mine.items(), key=lambda item: item[1].depth)
         return Refusal(why="collision", text=str(touch), options=len(mine), q=q[index], touch=touch)
     text = "every joint solution is at a singularity"
-    return Refusal(why="singular", text=text, options=int(there.sum()), q=q[there][0])
+    return Refusal(why="singular", text=text, options=int(there.sum()) + lost, q=q[there][0] if there.any() else None)

@@ -6,9 +6,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from weldsim.arm import Arm
 from weldsim.config import CellConfig, digest, limits_for, to_json
 from weldsim.dryrun.program import Program
 from weldsim.dryrun.verdict import DryRun, dry_run_json
+from weldsim.errors import InputError
 from weldsim.execution.contract import Clause
 from weldsim.output import write_whole
 from weldsim.records import KnownSeam, PointCloud, RobotFacts, SeamFindings
@@ -94,6 +98,27 @@ def contract_json(clauses: tuple[Clause, ...], facts: RobotFacts | None) -> dict
         "facts": told,
         "clauses": [asdict(clause) for clause in clauses],
     }
+
+
+def read_told_arm(file: Path) -> Arm:
+    """The arm that a controller told of, from the contract.json that a job left.
+
+    Raises:
+        InputError: it cannot be read, is none, or the controller did not tell; `data`: path.
+    """
+    try:
+        facts = json.loads(file.read_text(encoding="utf-8"))["facts"]
+        dh = None if facts is None else facts["dh"]
+        figures = None if dh is None else np.array(dh, float)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror or error})", path=str(file)) from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{file}: is no contract.json of a job", path=str(file)) from error
+    if figures is None:
+        raise InputError(f"{file}: the controller did not tell of its arm", path=str(file))
+    if figures.shape != (6, 4) or not np.isfinite(figures).all():
+        raise InputError(f"{file}: facts.dh: six rows of four numbers are needed", path=str(file))
+    return Arm(dh=figures)
 
 
 def job_document(

@@ -14,7 +14,7 @@ from weldsim.dryrun.program import Program
 from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.verdict import Trial
 from weldsim.errors import ExecutionError, InputError, Interrupted
-from weldsim.execution.contract import Clause, contract, require_kept
+from weldsim.execution.contract import Clause, contract, own_arm, require_kept
 from weldsim.execution.gate import SafetyGate
 from weldsim.execution.resample import LEAST_SCALE, at_period, slowed
 from weldsim.execution.robot import Robot
@@ -99,9 +99,9 @@ def weld(
 ) -> Job:
     """A path of a program executed by a robot through its safety gate.
 
-    Nothing moves unless the robot keeps its contract and the whole motion, planned from where the robot says it stands, passes
-    the dry run and every rule of the gate. Ctrl-C while it moves stops the arm and ends the job, which keeps its log; earlier it
-    is raised as ever.
+    Nothing moves unless the robot keeps its contract and the whole motion, planned from where the robot says it stands and with the
+    DH figures that it tells of itself, passes the dry run and every rule of the gate. Ctrl-C while it moves stops the arm and ends
+    the job, which keeps its log; earlier it is raised as ever.
 
     Args:
         program: as `read_program` gives it, with paths.  findings: its seams, one a path.
@@ -129,9 +129,10 @@ def weld(
             facts = gate.facts()
             clauses = contract(facts, gate.state(), config.execution.contract)
             require_kept(clauses, gate.name)
+            gate.arm = own_arm(facts)
         with clock.stage("dry run"):
             q_start = np.array(gate.state().q)
-            here = replace(cell, q_start=q_start)
+            here = replace(cell.fitted(gate.arm), q_start=q_start)
             trial = try_path(path, program.names[job.seam], here, replace(config.motion, period=gate.period))
         if trial.passed and trial.trajectory is not None:
             trajectory = at_period(slowed(trial.trajectory, job.speed_scale), gate.period)

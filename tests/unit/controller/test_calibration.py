@@ -8,12 +8,12 @@ import pytest
 
 from tests.calibrations import CONF, calibrated, written
 from tests.controllers import new_machine, run_program
+from weldsim.arm import Arm
 from weldsim.controller.calibration import Calibration, read_calibration
 from weldsim.controller.config import ControllerConfig
 from weldsim.controller.kinematics import Kinematics
 from weldsim.controller.primary import PERIOD, PrimarySession
 from weldsim.errors import ConfigError
-from weldsim.execution.contract import flange_deviation
 from weldsim.execution.primary_packet import ROBOT_MESSAGE, ROBOT_STATE, MessageReader, kinematics_in, sub_packages
 from weldsim.kinematics import DH
 from weldsim.mounts import X_FT
@@ -69,7 +69,7 @@ def test_no_file_and_no_text(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_test_arm_is_off_by_what_was_asked_though_its_figures_are_off_by_metres(size: float, seed: int) -> None:
     arm = calibrated(size, seed)
-    assert flange_deviation(arm.dh) == pytest.approx(size, rel=0.05)
+    assert Arm(dh=arm.dh).deviation() == pytest.approx(size, rel=0.05)
     assert np.abs(arm.dh - DH).max() > 5.0
 
 

@@ -5,7 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from tests.torch_paths import START, flat_curve, torch_path
+from tests.calibrations import calibrated
+from tests.controllers import new_machine
+from tests.torch_paths import OVER, START, flat_curve, torch_path
+from weldsim.arm import UR5, Arm
+from weldsim.controller.config import ControllerConfig
 from weldsim.curves import project
 from weldsim.dryrun.cell import empty_cell, scene_cell, shifted
 from weldsim.dryrun.reach import reach_map
@@ -47,6 +51,26 @@ def test_the_exported_program_follows_the_path(tmp_path):
             assert _tip_speed(q, longest / motion.speed / 199) < 1.01 * MotionConfig().air_speed
     assert np.abs(again.q[-1] - START).max() < 1e-6
     assert not program.motions[-1].arc
+
+
+def test_an_arms_own_program_takes_its_torch_along_the_path() -> None:
+    """Run by a controller of that arm; the nominal arm's program puts its torch millimetres off."""
+    calibration = calibrated(0.003, 1)
+    path = torch_path(flat_curve("line", 0.03) + np.array([0.0, -0.48, 0.06]), DOWN, speed=0.02)
+    off = []
+    for arm in (Arm(dh=calibration.dh), UR5):
+        trial = try_path(path, "seam", empty_cell(OVER).fitted(arm), MotionConfig(return_home=False, approach=0.02))
+        assert trial.trajectory is not None
+        machine = new_machine(config=ControllerConfig(calibration=calibration))
+        assert machine.upload(script_text(trial.trajectory, arm=arm)), machine.log[-1]
+        tips = []
+        while machine.program_name and machine.t < 60.0:
+            machine.tick()
+            if machine.io.digital_out & 1:
+                tips.append(machine.snapshot.tcp_pose[:3])
+        off.append(project(np.array(tips), path.X_BT.p)[0].max())
+    assert off[0] < 0.2e-3
+    assert off[1] > 0.5e-3
 
 
 def _tip_speed(q: np.ndarray, period: float) -> float:

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
+from tests.calibrations import calibrated
 from tests.torch_paths import START, flat_curve, torch_path
+from weldsim.arm import UR5, Arm
 from weldsim.config import load_config
 from weldsim.errors import ConfigError, ExecutionError, InputError
 from weldsim.execution.black_box import read_black_box
@@ -21,7 +23,7 @@ from weldsim.execution.limits import off_the_way
 from weldsim.execution.resample import at_period
 from weldsim.execution.robot import Robot
 from weldsim.execution.runner import execute
-from weldsim.kinematics import torch_pose
+from weldsim.kinematics import JOINT_NAMES, torch_pose
 from weldsim.motion.plan import plan_motion
 from weldsim.records import Event, JointTrajectory, RobotFacts, RobotState, Segment
 
@@ -545,3 +547,39 @@ def test_distance_from_a_polyline() -> None:
         nearest = np.linalg.norm(fine - point, axis=1).min()
         assert np.linalg.norm(off_the_way(point, way)) == pytest.approx(nearest, abs=1e-4)
     assert (off_the_way(np.ones(6), np.zeros((1, 6))) == 1).all()
+
+
+def test_the_tip_is_judged_by_the_arms_own_kinematics() -> None:
+    """Of two arms told the same angles one keeps to the box and the other leaves it, checked beforehand and as it moves."""
+    arm, q1 = Arm(dh=calibrated(0.015, 2).dh), START + 0.05
+    limit = float(arm.torch_tip(q1)[2] + UR5.torch_tip(q1)[2]) / 2
+    lower, upper = sorted((arm, UR5), key=lambda each: float(each.torch_tip(q1)[2]))
+    u = np.linspace(0.0, 1.0, 120)[:, None]
+    q = START + u**3 * (10 - 15 * u + 6 * u**2) * (q1 - START)
+    qd = np.gradient(q, 0.008, axis=0)
+    qd[[0, -1]] = 0.0
+    flat = np.zeros(len(q))
+    trajectory = JointTrajectory(
+        t=0.008 * np.arange(len(q)),
+        q=q,
+        qd=qd,
+        qdd=np.zeros_like(q),
+        s=flat,
+        arc_on=flat > 0,
+        segments=(Segment.AIR,) * len(q),
+        joint_names=JOINT_NAMES,
+    )
+    for own, outcome in ((lower, "kept"), (upper, "workspace")):
+        gate = gate_around(Puppet(), replace(GateConfig(), box_high=(1.1, 1.1, limit)))
+        gate.arm = own
+        assert _outcome(lambda gate=gate: gate.check(trajectory)) == outcome
+        assert _outcome(lambda gate=gate: [gate.servo(*row) for row in zip(q, qd, strict=True)]) == outcome
+
+
+def _outcome(act: Callable[[], object]) -> str:
+    """ "kept", or which rule was broken."""
+    try:
+        act()
+    except ExecutionError as error:
+        return str(error.data["rule"])
+    return "kept"
