@@ -1,4 +1,8 @@
-"""The dashboard server, port 29999: one line asked, one line answered (UR dashboard server guide)."""
+"""The dashboard server, port 29999: one line asked, one line answered.
+
+Words from UR's dashboard server guide; which series knows which command, and the answers about operational modes, reports and
+logs, as the manufacturer's Universal_Robots_Client_Library expects them.
+"""
 
 from collections.abc import Callable
 
@@ -7,6 +11,7 @@ from weldsim.execution.ur_modes import RobotMode, RuntimeState
 
 BANNER = b"Connected: Universal Robots Dashboard Server\n"
 MAX_LINE = 65536
+REPORTS = ("controller", "software", "system")
 ROLES = ("programmer", "operator", "none", "locked", "restricted")
 LOCAL = "Command is not allowed due to safety reasons."  # what an e-Series in local control says
 _LOCAL_TOO = frozenset(
@@ -37,7 +42,7 @@ class Dashboard:
 
     def __init__(self, machine: Machine) -> None:
         self._machine = machine
-        self._role, self._mode = "PROGRAMMER", "NONE"
+        self._role, self._mode, self._reports = "PROGRAMMER", "NONE", 0
         plain: dict[str, Callable[[], str]] = {
             "play": self._play,
             "stop": self._stop,
@@ -57,11 +62,11 @@ class Dashboard:
             "unlock protective stop": self._unlock,
             "restart safety": self._restart_safety,
             "PolyscopeVersion": lambda: machine.profile.software,
-            "version": lambda: machine.profile.software.removeprefix("URSoftware "),
+            "version": lambda: machine.profile.software.split()[1],
             "get serial number": lambda: machine.profile.serial,
             "get robot model": lambda: machine.profile.model,
             "shutdown": self._shut_down,
-            "getUserRole": lambda: self._role,
+            "saveLog": lambda: "Log saved to disk",
         }
         if machine.profile.remote_control:
             plain |= {
@@ -69,15 +74,19 @@ class Dashboard:
                 "get operational mode": lambda: self._mode,
                 "clear operational mode": self._clear_mode,
             }
+        else:
+            plain["getUserRole"] = lambda: self._role
         self._plain = plain
         self._with_text: dict[str, Callable[[str], str]] = {
             "load": self._load,
             "popup": self._popup,
             "addToLog": self._add_to_log,
-            "setUserRole": self._set_role,
+            "generate": self._generate,
         }
         if machine.profile.remote_control:
             self._with_text["set"] = self._set_mode
+        else:
+            self._with_text["setUserRole"] = self._set_role
 
     def answer(self, line: str) -> str:
         """The reply to one line, without newlines."""
@@ -127,6 +136,16 @@ class Dashboard:
         self._machine.say(text)
         return "Added log message"
 
+    def _generate(self, text: str) -> str:
+        """A flight report or a support file: both said to be there, neither is written."""
+        words = text.split()
+        if words[:2] == ["flight", "report"] and (words[2:] or ["system"])[0] in REPORTS and len(words) <= 3:
+            self._reports += 1
+            return f"Flight Report generated with id: {self._reports}"
+        if words[:2] == ["support", "file"] and len(words) == 3:
+            return f"Completed successfully: {words[2].rstrip('/')}/ur_{self._machine.profile.serial}.zip"
+        return f"could not understand: 'generate {text}'"
+
     def _set_role(self, role: str) -> str:
         if role.lower() not in ROLES:
             return f"Failed setting user role: {role}"
@@ -138,7 +157,7 @@ class Dashboard:
         if words[:2] != ["operational", "mode"] or len(words) != 3 or words[2] not in ("manual", "automatic"):
             return f"could not understand: 'set {text}'"
         self._mode = words[2].upper()
-        return f"Setting operational mode: {self._mode}"
+        return f"Operational mode '{words[2]}' is set"
 
     def _clear_mode(self) -> str:
         self._mode = "NONE"

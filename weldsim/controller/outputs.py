@@ -62,6 +62,10 @@ _FIXED: dict[str, tuple[str, Getter]] = {
     "standard_analog_output0": ("DOUBLE", lambda s: s.io.analog_out[0]),
     "standard_analog_output1": ("DOUBLE", lambda s: s.io.analog_out[1]),
     "io_current": ("DOUBLE", lambda s: 0.0),
+    "euromap67_input_bits": ("UINT32", lambda s: 0),
+    "euromap67_output_bits": ("UINT32", lambda s: 0),
+    "euromap67_24V_voltage": ("DOUBLE", lambda s: 0.0),
+    "euromap67_24V_current": ("DOUBLE", lambda s: 0.0),
     "tool_mode": ("UINT32", lambda s: s.joint_mode),
     "tool_analog_input_types": ("UINT32", lambda s: 3),
     "tool_analog_input0": ("DOUBLE", lambda s: 0.0),
@@ -69,6 +73,9 @@ _FIXED: dict[str, tuple[str, Getter]] = {
     "tool_output_voltage": ("INT32", lambda s: 0),
     "tool_output_current": ("DOUBLE", lambda s: 0.0),
     "tool_temperature": ("DOUBLE", lambda s: 30.0),
+    "tool_output_mode": ("UINT8", lambda s: 0),
+    "tool_digital_output0_mode": ("UINT8", lambda s: 0),
+    "tool_digital_output1_mode": ("UINT8", lambda s: 0),
     "output_bit_registers0_to_31": ("UINT32", lambda s: _mask(s.io.out_bit, 0)),
     "output_bit_registers32_to_63": ("UINT32", lambda s: _mask(s.io.out_bit, 32)),
     "input_bit_registers0_to_31": ("UINT32", lambda s: _mask(s.io.in_bit, 0)),
@@ -81,7 +88,15 @@ _FIXED: dict[str, tuple[str, Getter]] = {
     "collision_detection_ratio": ("DOUBLE", lambda s: 0.0),
     "ft_raw_wrench": ("VECTOR6D", lambda s: ZERO6),
 }
-_E_ONLY = {"ft_raw_wrench", "actual_current_window", "joint_position_deviation_ratio", "collision_detection_ratio", "safety_status"}
+_E_ONLY = {
+    "ft_raw_wrench",
+    "actual_current_window",
+    "joint_position_deviation_ratio",
+    "collision_detection_ratio",
+    "tool_output_mode",
+    "tool_digital_output0_mode",
+    "tool_digital_output1_mode",
+}
 _NUMBERED = re.compile(r"(input|output)_(bit|int|double)_register_(\d+)")
 _BANKS: dict[str, tuple[str, int, int]] = {
     "bit": ("BOOL", 64, BITS),
@@ -114,14 +129,15 @@ class OutputRecipe:
     Attributes:
         types: as the set-up reply says them, NOT_FOUND for a variable that is not there.
         complete: whether all are there; a client with a recipe that is not cannot start.
-        every: cycles of control from one packet to the next.
+        every: cycles of control from one packet to the next: the control frequency over the asked one, rounded down (UR RTDE
+            guide, set-up of outputs), so that a client never gets fewer packets than it asked for.
     """
 
     def __init__(self, names: Sequence[str], frequency: float, profile: Profile) -> None:
         found = [find_output(name, profile) for name in names]
         self.types = ["NOT_FOUND" if entry is None else entry[0] for entry in found]
         self.complete = None not in found
-        self.every = max(1, round(profile.frequency / frequency)) if frequency > 0 else 1
+        self.every = max(1, int(profile.frequency / frequency + 1e-9)) if frequency > 0 else 1
         entries = [entry for entry in found if entry is not None]
         self._layout = layout(tuple(kind for kind, _ in entries))
         self._sources = [(width(kind) > 1, getter) for kind, getter in entries]

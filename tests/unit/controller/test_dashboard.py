@@ -53,6 +53,22 @@ def test_exact_words(machine):
     assert Dashboard(new_machine("cb3")).answer("is in remote control") == "could not understand: 'is in remote control'"
 
 
+def test_each_series_knows_its_own_commands():
+    cb3, e = (Dashboard(new_machine(series)).answer for series in ("cb3", "e"))
+    for say in (cb3, e):
+        assert say("saveLog") == "Log saved to disk"
+        assert say("generate flight report") == "Flight Report generated with id: 1"
+        assert say("generate flight report controller") == "Flight Report generated with id: 2"
+        assert say("generate support file /programs").startswith("Completed successfully: /programs/")
+        assert say("generate noise") == "could not understand: 'generate noise'"
+    assert (cb3("version"), e("version")) == ("3.15.8.106339", "5.11.1.108318")
+    assert (cb3("setUserRole locked"), cb3("getUserRole")) == ("Setting user role: LOCKED", "LOCKED")
+    assert (e("set operational mode automatic"), e("get operational mode")) == ("Operational mode 'automatic' is set", "AUTOMATIC")
+    assert e("clear operational mode") == "No longer controlling the operational mode. Current operational mode: 'NONE'."
+    for say, command in ((e, "setUserRole locked"), (e, "getUserRole"), (cb3, "get operational mode")):
+        assert say(command) == f"could not understand: '{command}'"
+
+
 def test_power_and_brakes(machine):
     say = Dashboard(machine).answer
     assert (say("power off"), machine.robot_mode) == ("Powering off", RobotMode.POWER_OFF)

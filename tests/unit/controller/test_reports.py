@@ -118,8 +118,8 @@ def test_tool_has_two_outputs(machine):
     assert machine.io.digital_out == 0b10 << 16
 
 
-def test_unknown_user_role_is_refused(machine):
-    say = Dashboard(machine).answer
+def test_unknown_user_role_is_refused():
+    say = Dashboard(new_machine("cb3")).answer
     assert [say("setUserRole operator"), say("setUserRole boss"), say("getUserRole")] == [
         "Setting user role: OPERATOR",
         "Failed setting user role: boss",

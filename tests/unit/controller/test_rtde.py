@@ -65,6 +65,13 @@ def test_slower_client_gets_every_nth_packet(machine):
     assert sum(sent) == 4
 
 
+@pytest.mark.parametrize(
+    ("series", "asked", "every"), [("cb3", 50.0, 2), ("cb3", 80.0, 1), ("e", 300.0, 1), ("e", 60.0, 8), ("e", 1e4, 1)]
+)
+def test_client_never_gets_fewer_packets_than_it_asked_for(series, asked, every):
+    assert OutputRecipe(["timestamp"], asked, PROFILES[series]).every == every
+
+
 def test_unknown_variable_cannot_be_started(machine):
     session = new_session(machine)
     assert outputs(session, "timestamp,nonsense") == b"\x00DOUBLE,NOT_FOUND"
@@ -112,4 +119,7 @@ def test_every_known_variable_can_be_packed(series):
     recipe = OutputRecipe(names, 0.0, PROFILES[series])
     assert recipe.complete
     assert len(unpack_values(recipe.types, recipe.pack(machine.snapshot))) == len(names)
-    assert (find_output("ft_raw_wrench", PROFILES[series]) is None) == (series == "cb3")
+    for name in ("ft_raw_wrench", "tool_output_mode"):
+        assert (find_output(name, PROFILES[series]) is None) == (series == "cb3")
+    for name in ("safety_status", "euromap67_24V_voltage", "script_control_line"):
+        assert find_output(name, PROFILES[series]) is not None
