@@ -43,6 +43,8 @@ class Connection:
     def __init__(self, sock: socket.socket, session: Session) -> None:
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if (size := getattr(session, "send_buffer", None)) is not None:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, size)
         self.socket, self.session, self.open = sock, session, True
         self.stream = session if isinstance(session, Stream) else None  # looked up once: it takes 15 us, a period has 2000
         self._waiting = bytearray()
@@ -71,7 +73,17 @@ class Connection:
         except BlockingIOError:
             return
         except OSError:
+            self._hear_out()
             self.close()
+
+    def _hear_out(self) -> None:
+        """Let the session have what a client that is gone had still sent: a program, and hung up with our packets unread."""
+        self._waiting.clear()
+        try:
+            while data := self.socket.recv(RECEIVE_SIZE):
+                self.session.received(data)
+        except OSError:
+            return
 
     def receive(self) -> None:
         """Let the session answer what has come in."""

@@ -48,7 +48,7 @@ _FIXED: dict[str, tuple[str, Getter]] = {
     "tcp_force_scalar": ("DOUBLE", lambda s: 0.0),
     "actual_main_voltage": ("DOUBLE", lambda s: 48.0),
     "actual_robot_voltage": ("DOUBLE", lambda s: s.voltage),
-    "actual_robot_current": ("DOUBLE", lambda s: 0.5 if s.voltage else 0.0),
+    "actual_robot_current": ("DOUBLE", lambda s: s.robot_current),
     "actual_joint_voltage": ("VECTOR6D", lambda s: (s.voltage,) * 6),
     "actual_digital_output_bits": ("UINT64", lambda s: s.io.digital_out),
     "runtime_state": ("UINT32", lambda s: s.runtime_state),

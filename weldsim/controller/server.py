@@ -17,8 +17,8 @@ from weldsim.controller.faults import FaultSession
 from weldsim.controller.functions import builtins
 from weldsim.controller.machine import Machine
 from weldsim.controller.primary import PrimarySession
+from weldsim.controller.realtime import RealtimeSession
 from weldsim.controller.rtde import Claims, RtdeSession
-from weldsim.controller.script_port import ScriptSession
 from weldsim.errors import InputError
 from weldsim.execution.ur_ports import DASHBOARD, FAULTS, PRIMARY, REALTIME, RTDE, SECONDARY
 
@@ -41,8 +41,8 @@ class Server:
         sessions: dict[int, Callable[[], Session]] = {
             DASHBOARD: lambda: DashboardSession(dashboard),
             PRIMARY: lambda: PrimarySession(machine),
-            SECONDARY: lambda: ScriptSession(machine),
-            REALTIME: lambda: ScriptSession(machine),
+            SECONDARY: lambda: PrimarySession(machine),
+            REALTIME: lambda: RealtimeSession(machine),
             RTDE: lambda: RtdeSession(machine, claims),
             FAULTS: lambda: FaultSession(self),
         }

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 JOINT_POWER_OFF = 239
 JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.BACKDRIVE: 238, RobotMode.IDLE: 255, RobotMode.POWER_ON: 255}  # UR RTDE guide
-BUS_VOLTAGE = 48.0  # [V]
+BUS_VOLTAGE, IDLE_CURRENT = 48.0, 0.5  # [V], [A]
 STANDARD_GRAVITY = 9.80665  # [m/s2]
 Frames = Float[ndarray, "6 4 4"]
 TORQUE_CONSTANT = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)  # [Nm/A] order of magnitude, behind the gear; no published figure
@@ -29,7 +29,7 @@ class Snapshot:
         q, qd: measured [rad, rad/s].  q_target, qd_target, qdd_target: the reference.  torque [Nm].
         io: registers and signals.  tcp_offset: active TCP.  payload [kg], payload_cog [m], payload_inertia [kg m2].
         robot_mode, safety_mode, runtime_state, status_bits, safety_bits: as the RTDE guide numbers them.
-        joint_mode: of every joint.  voltage: of arm and joints [V].
+        joint_mode: of every joint.  voltage: of arm and joints [V].  robot_current: of the arm [A].
         speed_scaling: what the controller itself slows its moves down by; times the slider it is the share of the programmed speed.
     """
 
@@ -49,7 +49,7 @@ class Snapshot:
         powered = machine.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
         self.status_bits = int(powered) | int(playing) << 1 | 1 << 3
         self.joint_mode = JOINT_MODES.get(machine.robot_mode, JOINT_POWER_OFF)
-        self.voltage = BUS_VOLTAGE if powered else 0.0
+        self.voltage, self.robot_current = (BUS_VOLTAGE, IDLE_CURRENT) if powered else (0.0, 0.0)
         self.speed_scaling = machine.limiter if machine.can_move else 0.0
 
     @cached_property
