@@ -6,8 +6,10 @@ by the ur_rtde client through `UrRobot`. Judged are the executed tip against the
 collisions, and where the arc came on and went off. Exits 1 where a limit is broken. Writes Markdown and JSON.
 
     python experiments/21_execute_scenes.py [--scenes straight y] [--robots sim cb3 e] [--speed 1] [--record]
+    python experiments/21_execute_scenes.py --robots cb3 e --calibration experiments/published_ur5.conf
 
-With --speed below 1 the controllers' clock runs slower than the wall's: for a machine that cannot keep 500 Hz.
+With --speed below 1 the controllers' clock runs slower than the wall's: for a machine that cannot keep 500 Hz. With --calibration
+the controllers' arm has the DH figures of that file, and the tip is where they put it; results go to files of their own.
 """
 
 import argparse
@@ -28,11 +30,11 @@ from weldsim.config import CellConfig, load_scene, paced_for
 from weldsim.controller.ask import ask
 from weldsim.dryrun.cell import scene_cell
 from weldsim.dryrun.read import read_program
+from weldsim.execution.contract import own_arm
 from weldsim.execution.robot import Robot
 from weldsim.execution.simulated import SimulatedRobot
 from weldsim.execution.ur_robot import UrRobot
 from weldsim.jobs import to_weld
-from weldsim.kinematics import torch_pose
 from weldsim.path.files import path_document, write_path_json
 from weldsim.pipeline import look, plan
 from weldsim.records import ExecutionLog, Segment
@@ -59,10 +61,11 @@ WORDS = {
 
 
 @contextmanager
-def controller(profile: str, scene: str, speed: float, host: str) -> Iterator[str]:
+def controller(profile: str, scene: str, speed: float, host: str, calibration: Path | None) -> Iterator[str]:
     """The address of a controller in its own process while the block lasts."""
     command = [sys.executable, "-m", "weldsim", "controller", "--profile", profile, "--host", host, "--speed", str(speed)]
-    with subprocess.Popen([*command, "--scene", scene], stdout=subprocess.PIPE, text=True) as process:
+    command += ["--scene", scene] if calibration is None else ["--scene", scene, "--calibration", str(calibration)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
             if host not in process.stdout.readline():
@@ -73,7 +76,7 @@ def controller(profile: str, scene: str, speed: float, host: str) -> Iterator[st
             process.wait()
 
 
-def executed(scene_name: str, robot: str, file: Path, speed: float, seed: int) -> dict[str, Any]:
+def executed(scene_name: str, robot: str, file: Path, speed: float, seed: int, calibration: Path | None = None) -> dict[str, Any]:
     """One scene welded by one robot, measured."""
     scene = load_scene(scene_name)
     config = paced_for(CellConfig(), scene)
@@ -89,7 +92,7 @@ def executed(scene_name: str, robot: str, file: Path, speed: float, seed: int) -
         done = done_by(SimulatedRobot(cell.model, cell.q_start, config.execution.simulation))
     else:
         host = f"127.32.{ROBOTS.index(robot)}.{SCENES.index(scene_name) + 1}"
-        with controller(robot, scene_name, speed, host):
+        with controller(robot, scene_name, speed, host, calibration):
             done = done_by(UrRobot(replace(config.execution.ur, host=host)))
             events = [str(line) for line in ask(host, {"status": True}).get("log", [])]
     row: dict[str, Any] = {"scene": scene_name, "robot": robot, "seed": seed, "figures": {}, "broken": []}
@@ -114,11 +117,12 @@ def executed(scene_name: str, robot: str, file: Path, speed: float, seed: int) -
 def measured(log: ExecutionLog, done: Job) -> dict[str, float]:
     """Figures of a log [SI]: the measured tip from the planned line; differences of what was sent; where the arc burnt."""
     assert done.report is not None
+    assert done.facts is not None
     # A state that nobody had time to look at repeats the command before it in the log: commands are told by what is new.
     h, q = log.period, log.q_cmd[np.concatenate([[True], (np.diff(log.q_cmd, axis=0) != 0).any(axis=1)])]
     speed = np.diff(q, axis=0) / h
     jerk, acceleration = np.diff(speed, n=2, axis=0) / h**2, np.diff(speed, axis=0) / h
-    torch = np.linalg.norm(np.diff(torch_pose(q).p, axis=0), axis=1) / h
+    torch = np.linalg.norm(np.diff(own_arm(done.facts).torch_tip(q), axis=0), axis=1) / h
     weld_rows = np.array([segment == Segment.WELD for segment in log.segments])
     burnt, asked = log.s_cmd[log.arc_on], log.s_cmd[weld_rows]
     # An output is reported off a few periods after it was told: what counts is how far the torch is by then, and never in the air.
@@ -151,7 +155,7 @@ def path_of(scene_name: str, folder: Path, seed: int) -> Path:
     return file
 
 
-def markdown(rows: list[dict[str, Any]], speed: float) -> str:
+def markdown(rows: list[dict[str, Any]], speed: float, calibration: Path | None = None) -> str:
     """A row for each scene and robot; the limits; what is broken."""
     names = list(WORDS)
     head = " | ".join(
@@ -160,7 +164,12 @@ def markdown(rows: list[dict[str, Any]], speed: float) -> str:
     )
     lines = [
         "Welded from the twin's scan through the safety gate; sim: the simulated arm in this process, cb3 and e: the ur_rtde client"
-        f" over sockets to a virtual controller (clock at {speed:g} of the wall's).",
+        f" over sockets to a virtual controller (clock at {speed:g} of the wall's)."
+        + (
+            ""
+            if calibration is None
+            else f" The controller's arm has the DH figures of {calibration.name}, the tip is where they put it."
+        ),
         "",
         f"| scene | robot | time | {head} | collisions | holds |",
         "|---" * (len(names) + 5) + "|",
@@ -184,16 +193,19 @@ def main() -> int:
     parser.add_argument("--robots", nargs="*", choices=ROBOTS, default=list(ROBOTS))
     parser.add_argument("--speed", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--calibration", type=Path, help="factory calibration of the controllers' arm, a calibration.conf")
     parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--record", action="store_true", help="write the figures of README.md too")
     options = parser.parse_args()
+    if options.calibration is not None and (options.record or "sim" in options.robots):
+        parser.error("--calibration goes with --robots cb3 e, and without --record")
     os.environ.setdefault("MUJOCO_GL", "egl")
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for scene in options.scenes:
             file = path_of(scene, Path(folder), options.seed)
             for robot in options.robots:
-                row = executed(scene, robot, file, options.speed, options.seed)
+                row = executed(scene, robot, file, options.speed, options.seed, options.calibration)
                 rows.append(row)
                 shown = ", ".join(f"{w} {k * row['figures'][n]:.3g} {u}" for n, (w, k, u) in WORDS.items() if n in row["figures"])
                 print(
@@ -202,11 +214,12 @@ def main() -> int:
                     sep="\n    ",
                     flush=True,
                 )
-    text = markdown(rows, options.speed)
+    text = markdown(rows, options.speed, options.calibration)
+    name = "21_execute_scenes" if options.calibration is None else "21_execute_scenes_calibrated"
     print(text)
     options.out.mkdir(exist_ok=True)
-    (options.out / "21_execute_scenes.md").write_text(text)
-    (options.out / "21_execute_scenes.json").write_text(json.dumps({"speed": options.speed, "rows": rows}, indent=1) + "\n")
+    (options.out / f"{name}.md").write_text(text)
+    (options.out / f"{name}.json").write_text(json.dumps({"speed": options.speed, "rows": rows}, indent=1) + "\n")
     complete = set(options.scenes) == set(SCENES) and set(options.robots) == set(ROBOTS)
     if options.record and complete and not any("not welded" in text for row in rows for text in row["broken"]):
         command = "python experiments/21_execute_scenes.py --record"

@@ -44,6 +44,8 @@ class Clause:
 def check_contract(robot: Robot, config: ContractConfig | None = None, X_FT: Transform = NOMINAL_X_FT) -> tuple[Clause, ...]:
     """Every line of the contract with a connected robot, all of them kept; nothing moves.
 
+    What is then planned for it takes `own_arm` of its facts, and so does its gate (`SafetyGate.arm`).
+
     Args:
         robot: connected.  config: tolerances.  X_FT: the mount that plans are made with.
     Raises:

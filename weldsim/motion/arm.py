@@ -1,7 +1,8 @@
 """The arm as geometry alone: a MuJoCo model for differential kinematics, the Jacobian, and rough centre lines.
 
-Everything is expressed in the controller's base B and built from the same Denavit-Hartenberg figures as
-`weldsim.kinematics`, so that a solved pose and a checked pose agree to rounding.
+Everything is expressed in the controller's base B. The model has the arm's own figures, so that a solved pose and a checked pose
+agree to rounding; the Jacobian, dexterity and centre lines have the nominal arm's: they weigh postures, and a calibration changes
+them by millimetres where centimetres count.
 """
 
 from typing import NamedTuple

