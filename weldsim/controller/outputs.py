@@ -70,7 +70,7 @@ _FIXED: dict[str, tuple[str, Getter]] = {
     "tool_analog_input_types": ("UINT32", lambda s: 3),
     "tool_analog_input0": ("DOUBLE", lambda s: 0.0),
     "tool_analog_input1": ("DOUBLE", lambda s: 0.0),
-    "tool_output_voltage": ("INT32", lambda s: 0),
+    "tool_output_voltage": ("INT32", lambda s: s.io.tool_voltage),
     "tool_output_current": ("DOUBLE", lambda s: 0.0),
     "tool_temperature": ("DOUBLE", lambda s: 30.0),
     "tool_output_mode": ("UINT8", lambda s: 0),

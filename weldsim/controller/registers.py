@@ -19,7 +19,7 @@ class Registers:
         digital_in, digital_out: bit masks; bits 0-7 standard, 8-15 configurable, 16-17 tool.
         analog_in, analog_out: two standard channels each, [V] or [A] as their domain says.
         analog_in_domain, analog_out_domain: bit k: channel k is a voltage (1) or a current (0).
-        slider: the speed slider, 0 to 1.
+        slider: the speed slider, 0 to 1.  tool_voltage: at the tool connector [V].
     """
 
     in_bit: list[bool] = field(default_factory=lambda: [False] * BITS)
@@ -35,6 +35,7 @@ class Registers:
     analog_in_domain: int = 3
     analog_out_domain: int = 0
     slider: float = 1.0
+    tool_voltage: int = 0
 
     def set_digital_out(self, bit: int, on: bool) -> None:
         """Switch one output; bit 0-17 as in `digital_out`."""

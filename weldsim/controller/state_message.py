@@ -54,7 +54,7 @@ def _sub_packages(machine: Machine) -> Iterator[tuple[int, bytes]]:
             for q, q_target, qd, current in zip(now.q, now.q_target, now.qd, now.current, strict=True)
         ),
     )
-    yield TOOL, _TOOL.pack(1, 1, 0.0, 0.0, now.voltage, 0, 0.0, WARM, now.joint_mode)
+    yield TOOL, _TOOL.pack(1, 1, 0.0, 0.0, now.voltage, machine.io.tool_voltage, 0.0, WARM, now.joint_mode)
     yield MASTERBOARD, _masterboard(machine)
     yield CARTESIAN, _CARTESIAN.pack(*now.tcp_pose, *now.tcp_offset)
     yield KINEMATICS_INFO, KinematicsInfo(machine.kinematics.dh, machine.config.calibration.calibration_status).encode()

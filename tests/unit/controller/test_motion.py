@@ -254,3 +254,65 @@ def test_a_target_beyond_a_joints_range_is_refused_before_it_moves(line):
     assert "its range is" in machine.log[-1][1]
     assert machine.safety_mode is SafetyMode.NORMAL
     np.testing.assert_allclose(machine.arm.q, HOME, atol=1e-3)
+
+
+def arc_of(machine: Machine, q: np.ndarray) -> np.ndarray:
+    """Flange positions along joint angles."""
+    tcp = machine.tool.tcp_matrix
+    return np.array([machine.kinematics.tcp_pose(row, tcp) for row in q.tolist()])
+
+
+@pytest.mark.parametrize("mode", [0, 1])
+def test_movec_keeps_to_its_circle(mode):
+    machine, random = new_machine("cb3"), np.random.default_rng(mode)
+    x, y, z, *turn = start = home_pose()
+    radius, plane = random.uniform(0.03, 0.08), random.uniform(0, np.pi)
+    across = np.array([np.cos(plane), 0.0, np.sin(plane)])
+    centre = np.array([x, y, z]) + radius * across
+
+    def on_circle(angle: float) -> np.ndarray:
+        return centre + radius * (-np.cos(angle) * across + np.sin(angle) * np.array([0.0, -1.0, 0.0]))
+
+    angle = random.uniform(2.0, 4.0)
+    via, end = ([*on_circle(share * angle), *turn] for share in (random.uniform(0.3, 0.7), 1.0))
+    q, _ = follow(machine, f"movec(p[{numbers(via)}], p[{numbers(end)}], a=1.0, v=0.08, mode={mode})", 20.0)
+    poses = arc_of(machine, q)
+    np.testing.assert_allclose(poses[-1, :3], end[:3], atol=1e-7)
+    leg = poses[:, :3] - centre
+    np.testing.assert_allclose(np.linalg.norm(leg, axis=1), radius, atol=1e-6)
+    np.testing.assert_allclose(leg @ np.array([-across[2], 0.0, across[0]]), 0.0, atol=1e-6)
+    speed = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1) / machine.profile.period
+    assert speed.max() == pytest.approx(0.08, rel=0.01)
+    turned = np.linalg.norm(np.diff(arc_of(machine, q[[0, -1]])[:, 3:], axis=0))
+    assert (turned < 1e-6) == (mode == 0)
+    assert start[:3] != end[:3]
+
+
+def test_movec_goes_on_after_a_pause():
+    machine = new_machine("cb3")
+    x, y, z, *turn = home_pose()
+    via, end = [x + 0.05, y, z + 0.05, *turn], [x + 0.1, y, z, *turn]
+    assert machine.upload(f"movec(p[{numbers(via)}], p[{numbers(end)}], v=0.1)")
+    poses = []
+    for k in range(round(4.0 / machine.profile.period)):
+        if k == round(1.1 / machine.profile.period):  # beyond `via`
+            machine.pause()
+        if k == round(1.6 / machine.profile.period):
+            machine.play()
+        machine.tick()
+        poses.append(machine.kinematics.tcp_pose(machine.reference.q, machine.tool.tcp_matrix))
+    assert (machine.safety_mode, machine.runtime) == (SafetyMode.NORMAL, RuntimeState.STOPPED)
+    np.testing.assert_allclose(poses[-1][:3], end[:3], atol=1e-7)
+    off = np.linalg.norm(np.array(poses)[:, :3] - [x + 0.05, y, z], axis=1) - 0.05
+    assert np.abs(off).max() < 1e-3
+
+
+def test_movec_on_a_line_or_out_of_reach_is_refused(machine):
+    x, y, z, *turn = home_pose()
+    for via, end, word in (
+        ([x + 0.05, y, z, *turn], [x + 0.1, y, z, *turn], "no circle"),
+        ([x + 2.0, y, z, *turn], [x + 0.1, y, z, *turn], "cannot reach"),
+    ):
+        run_program(machine, f"movec(p[{numbers(via)}], p[{numbers(end)}])")
+        assert word in machine.log[-1][1]
+        assert machine.safety_mode is SafetyMode.NORMAL

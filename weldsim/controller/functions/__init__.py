@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from weldsim.controller.functions.geometry import GeometryFunctions
+from weldsim.controller.functions.installation import InstallationFunctions
 from weldsim.controller.functions.motion import MotionFunctions
 from weldsim.controller.functions.robot import RobotFunctions
 from weldsim.controller.functions.signals import SignalFunctions
@@ -10,6 +11,7 @@ from weldsim.controller.functions.system import SystemFunctions
 from weldsim.controller.machine import Machine
 from weldsim.urscript.geometry import PoseFunctions
 from weldsim.urscript.numbers import NumberFunctions
+from weldsim.urscript.strings import StringFunctions
 
 E_ONLY = frozenset(
     [
@@ -37,8 +39,10 @@ def builtins(machine: Machine) -> dict[str, Callable]:
         RobotFunctions(machine),
         SignalFunctions(machine),
         SystemFunctions(machine),
+        InstallationFunctions(machine),
         PoseFunctions(),
         NumberFunctions(),
+        StringFunctions(),
     )
     found = {name: getattr(group, name) for group in groups for name in dir(group) if not name.startswith("_")}
     return {name: f for name, f in found.items() if machine.profile.series == "e" or name not in E_ONLY}

@@ -9,6 +9,7 @@ from weldsim.controller.machine import Machine
 from weldsim.controller.reference import STOP_DECELERATION
 from weldsim.controller.trapezoid import Trapezoid
 from weldsim.kinematics import JOINT_LIMIT, SPEED_LIMIT
+from weldsim.urscript.arc import Arc
 from weldsim.urscript.check import is_pose, positive, six
 from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.poses import Matrix, pose_between, turn_between
@@ -16,6 +17,8 @@ from weldsim.urscript.values import number
 
 Motion = Generator[None, None, None]
 Step = Callable[[], object]
+PoseAt = Callable[[float], list[float]]  # the pose a share of the way along
+Way = tuple[float, PoseAt]  # how long [m], and where it leads
 T = TypeVar("T")
 TURN_RADIUS = 0.25  # [m] a turn of one radian of the tool counts as this long a way
 MAX_ACCELERATION = 40.0  # [rad/s2] or [m/s2]
@@ -26,7 +29,7 @@ ARRIVED, ARRIVAL_TIME = 5e-5, 0.1  # [rad] a move ends when every joint is this 
 
 
 class MotionFunctions:
-    """movej, movel, movep, servoj, servoc, speedj, speedl, stopj, stopl.
+    """movej, movel, movec, movep, servoj, servoc, speedj, speedl, stopj, stopl.
 
     Blends are not modelled: every move comes to rest at its target. servoj follows its target `lookahead_time` late; its gain is
     checked and otherwise not modelled.
@@ -68,18 +71,48 @@ class MotionFunctions:
         self._joints_of(target)
         yield from self._towards(target, self._line(target, a, v, t))
 
+    def movec(self, pose_via: Any, pose_to: Any, a: float = 1.2, v: float = 0.25, r: float = 0, mode: int = 0) -> Motion:
+        """TCP on a circular arc through one pose to another, at v [m/s] and a [m/s2] along it.
+
+        The orientation turns evenly to that of pose_to, or with mode 1 keeps its angle to the arc.
+        """
+        via, target = self._pose(pose_via), self._pose(pose_to)
+        a, v = min(positive(a, "a"), MAX_ACCELERATION), positive(v, "v")
+        if number(mode) not in (0, 1):
+            raise ScriptError(f"movec: mode = {mode} is neither 0 nor 1")
+        for pose in (via, target):
+            self._joints_of(pose)
+
+        arcs: list[Arc] = []
+
+        def arc(start: list[float]) -> Way:
+            """The whole arc; after a stop on the way what is left of it."""
+            if not arcs:
+                arcs.append(Arc(start, via, target, fixed=bool(mode)))
+            whole = max(arcs[0].length, TURN_RADIUS * arcs[0].turn)
+            return whole * (1.0 - arcs[0].share_of(start)), arcs[0].rest(start)
+
+        yield from self._towards(target, self._follow(arc, a, v, 0))
+
     def _line(self, target: list[float], a: float, v: float, t: float) -> Motion:
-        """TCP to the pose target, planned anew after whatever held it."""
+        """TCP to the pose target."""
+
+        def line(start: list[float]) -> Way:
+            way = hypot(*(new - old for new, old in zip(target[:3], start[:3], strict=True)))
+            return max(way, TURN_RADIUS * turn_between(start, target)), lambda share: pose_between(start, target, share)
+
+        return self._follow(line, a, v, t)
+
+    def _follow(self, way: Callable[[list[float]], Way], a: float, v: float, t: float) -> Motion:
+        """TCP along the way that leads on from a pose, planned anew after whatever held it."""
         while True:
             yield from self._settle()
-            start = self._machine.kinematics.tcp_pose(self._reference.q, self._tcp)
-            way = hypot(*(new - old for new, old in zip(target[:3], start[:3], strict=True)))
-            length = max(way, TURN_RADIUS * turn_between(start, target))
+            length, pose_at = way(self._machine.kinematics.tcp_pose(self._reference.q, self._tcp))
             profile = self._profile(length, v, a, t)
 
-            def at(elapsed: float, start: list[float] = start, length: float = length, p: Trapezoid = profile) -> None:
+            def at(elapsed: float, length: float = length, pose_at: PoseAt = pose_at, p: Trapezoid = profile) -> None:
                 s, speed = p.at(elapsed)
-                q = self._near(pose_between(start, target, s / length if length > 0 else 1.0))
+                q = self._near(pose_at(s / length if length > 0 else 1.0))
                 self._reference.move(q, None if speed > 0 else [0.0] * 6)
 
             if (yield from self._along(at, profile.duration)):
