@@ -104,9 +104,10 @@ def struck(drill: Drill, *acts: str, seconds: float = 1.0, rules: tuple[str, ...
     pytest.fail(f"no weld in {ATTEMPTS} attempts: {why}")
 
 
-def in_time(record: Record, limit: float = LIMIT) -> bool:
-    """Whether arc and arm were at rest within it [s] of the strike."""
-    return record.after(record.arc) < limit and record.after(record.moving) < limit
+def check_rest(record: Record, limit: float = LIMIT) -> None:
+    """Arc off and arm at rest within it [s] of the strike."""
+    assert record.after(record.arc) < limit, record.log
+    assert record.after(record.moving) < limit, record.log
 
 
 def check_end(seen: dict[str, Any], rules: tuple[str, ...], blind: bool) -> None:
@@ -143,8 +144,7 @@ def check_next(host: str) -> None:
 
 @pytest.mark.parametrize("fault", RULES)
 def test_a_fault_of_the_controller(drill: Drill, fault: str) -> None:
-    record = struck(drill, fault, seconds=1.0 if fault == "stall" else 0.4, rules=RULES[fault])
-    assert in_time(record), record.log
+    check_rest(struck(drill, fault, seconds=1.0 if fault == "stall" else 0.4, rules=RULES[fault]))
     check_next(drill.host)
 
 
@@ -188,7 +188,7 @@ def test_local_control_ends_a_weld_on_e_series(drill: Drill) -> None:
         with ur_robot(drill.host) as robot:
             assert robot.facts().remote_control is None
         return
-    assert in_time(struck(drill, "local-control", rules=("remote_control",)))
+    check_rest(struck(drill, "local-control", rules=("remote_control",)))
     with pytest.raises(ExecutionError, match="remote control"):
         ur_robot(drill.host).connect()
     check_next(drill.host)
@@ -196,21 +196,19 @@ def test_local_control_ends_a_weld_on_e_series(drill: Drill) -> None:
 
 @pytest.mark.parametrize("how", ["kill-client", "hold-client"])
 def test_a_client_that_dies_or_hangs(drill: Drill, how: str) -> None:
-    record = struck(drill, how, rules=("client",))
-    assert in_time(record), record.log
+    check_rest(struck(drill, how, rules=("client",)))
     check_next(drill.host)
 
 
 @pytest.mark.parametrize("whom", [("kill-owner",), ("kill-client", "kill-owner")], ids=" and ".join)
 def test_a_killed_owner(drill: Drill, whom: tuple[str, ...]) -> None:
     record = struck(drill, *whom)
-    assert in_time(record, LIMIT_KILLED), record.log
+    check_rest(record, LIMIT_KILLED)
     check_next(drill.host)
 
 
 def test_an_owner_that_stalls_is_stopped_and_told(drill: Drill) -> None:
-    record = struck(drill, "hold-owner", rules=("stall",))
-    assert in_time(record), record.log
+    check_rest(struck(drill, "hold-owner", rules=("stall",)))
     check_next(drill.host)
 
 

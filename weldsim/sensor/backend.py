@@ -18,7 +18,7 @@ from weldsim.errors import SensorError
 Backend = Literal["egl", "osmesa", "glfw", "embree"]
 GlPlatform = Literal["egl", "osmesa", "glfw"]
 
-PATIENCE = 30.0  # [s] for a trial in a process of its own
+PATIENCE = 60.0  # [s] for a trial in a process of its own: a busy machine is no missing driver
 
 _OFF = ("disable", "disabled", "off", "false", "0")
 _ANY = ("", "enable", "enabled", "on", "true", "1")

@@ -52,7 +52,8 @@ class Listener:
                 assert isinstance(sock, socket.socket)
                 if what == "listen":
                     client, _ = sock.accept()
-                    client.sendall(self.greeting(port))
+                    with contextlib.suppress(OSError):  # it may have hung up before it was served
+                        client.sendall(self.greeting(port))
                     self.selector.register(client, selectors.EVENT_READ, ("client", port))
                     continue
                 data = b""
@@ -60,7 +61,8 @@ class Listener:
                     data = sock.recv(4096)
                 self.heard[port] += data
                 if data:
-                    sock.sendall(self.answer(port, data))
+                    with contextlib.suppress(OSError):
+                        sock.sendall(self.answer(port, data))
                 else:
                     self.selector.unregister(sock)
                     sock.close()
