@@ -63,6 +63,7 @@ def test_command_before_connect_is_refused(robot: Robot) -> None:
         robot.servo(START, STILL)
 
 
+@unless_held_up
 def test_facts_are_those_of_our_arm_and_mount(robot: Robot) -> None:
     with pytest.raises(ExecutionError, match="connect"):
         robot.facts()

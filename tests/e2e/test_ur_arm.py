@@ -1,6 +1,7 @@
 """Calibrated arms behind real sockets: what the contract says of them, and welds that are where they were planned."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.calibrations import PUBLISHED, calibrated, written
+from tests.controllers import PATIENCE
 from tests.machine import unless_held_up
 from tests.torch_paths import OVER, START, flat_curve, torch_path
 from tests.ur_robots import CONNECT_TIMEOUT, PATIENT, controlled, place, ur_robot
@@ -16,6 +18,7 @@ from weldsim.cli import main
 from weldsim.controller.ask import ask
 from weldsim.controller.calibration import Calibration
 from weldsim.execution.contract import Clause, check_contract, contract
+from weldsim.execution.ur_arm import tell_arm
 from weldsim.execution.ur_config import Series
 from weldsim.kinematics import DH, torch_pose
 from weldsim.records import TorchPath
@@ -104,6 +107,7 @@ def test_a_calibrated_arm_welds_the_path_itself(
 def test_an_arm_that_is_another_is_refused_before_anything_moves(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("weldsim.execution.ur_link.tell_arm", partial(tell_arm, seconds=PATIENCE))  # however busy the machine is
     path, out = tmp_path / "path.csv", tmp_path / "out"
     path.write_text("".join(f"{-0.4 + 0.002 * k:.3f},-0.3,0.1,2.2,2.2,0\n" for k in range(20)))
     with controlled("cb3", "--calibration", str(written(tmp_path, calibrated(0.025)))) as host:
