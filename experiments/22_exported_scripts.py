@@ -27,7 +27,9 @@ from typing import Any
 import numpy as np
 
 from weldsim.cli import main as run_command
+from weldsim.config import load_scene
 from weldsim.curves import arc_length, project
+from weldsim.dryrun.cell import empty_cell, scene_cell
 from weldsim.dryrun.read import read_program
 from weldsim.execution.rtde_packet import Packet, PacketReader, PacketType, unpack_values
 from weldsim.execution.ur_ports import REALTIME, RTDE
@@ -200,7 +202,8 @@ def measure(names: list[str], profiles: list[str], speed: float) -> list[dict[st
                 host, began = ADDRESS.format(k + 1), time.perf_counter()
                 with controller(profile, None if name == THESIS else name, speed, host):
                     rode = ride(host, found[0].read_text())
-                burning = [motion for motion in read_program(found[0]).motions if motion.arc]
+                cell = empty_cell() if name == THESIS else scene_cell(load_scene(name))
+                burning = [motion for motion in read_program(found[0], q_start=cell.q_start).motions if motion.arc]
                 figures = judged(rode, found[1], torch_pose(np.array([motion.q for motion in burning])).p, burning[0].t)
                 broken = [
                     f"{key} {value:.3g} (limit {limit:g})"

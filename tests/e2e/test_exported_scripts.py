@@ -13,6 +13,7 @@ from weldsim.cli import main
 from weldsim.dryrun.read import read_program
 from weldsim.kinematics import torch_pose
 from weldsim.records import TorchPath
+from weldsim.scene.world import HOME
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def test_an_exported_program_follows_its_path(module: ModuleType, exported: tupl
     with module.controller(profile, None, 3.0, host):
         rode = module.ride(host, file.read_text())
     assert rode.ended
-    burning = [motion for motion in read_program(file).motions if motion.arc]
+    burning = [motion for motion in read_program(file, q_start=HOME).motions if motion.arc]
     figures = module.judged(rode, path, torch_pose(np.array([motion.q for motion in burning])).p, burning[0].t)
     for name, limit in module.LIMITS.items():
         assert figures[name] <= limit, name

@@ -17,6 +17,7 @@ from weldsim.errors import InputError, SensorError
 if TYPE_CHECKING:
     from weldsim.arm import Arm
     from weldsim.dryrun.cell import Cell
+    from weldsim.dryrun.change import Change
     from weldsim.dryrun.verdict import DryRun, Trial, Verdict
     from weldsim.motion.config import MotionConfig
     from weldsim.records import TorchPath
@@ -56,6 +57,18 @@ class DryRunCommand(ConfigOptions):
     roll: bool = False
     """Leave the rotation about the wire of a CSV's poses free."""
 
+    turn: str | None = None
+    """Turn the torch about its wire first, "-15 deg" say, at every pose; fixes are told in such options."""
+
+    lean: str | None = None
+    """Lean the torch first: added work angle and travel angle, "5 deg, 0 deg"."""
+
+    move: str | None = None
+    """Move part, fixture and job first, along x and y of the base: "20 mm, -35 mm"."""
+
+    speed: str | None = None
+    """Weld at this speed at most: "5 mm/s"."""
+
     no_fix: bool = False
     """Do not look for changes that would help."""
 
@@ -84,23 +97,31 @@ class DryRunCommand(ConfigOptions):
         check_suffix(self.export, (".script", ".urscript"), "a program")
         check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file, self.arm))
         config, q_start = self.cell(), None if self.start is None else joint_angles(self.start)
+        change = self._change()
 
         from weldsim.config import paced_for
+        from weldsim.dryrun.change import changed
         from weldsim.dryrun.read import read_program
         from weldsim.dryrun.run import dry_run
 
         config = paced_for(config, None if self.scene is None else self.scene_of(self.scene))
+        cell = self._cell(q_start)
         program = read_program(
-            self.file, tool=self.tool, base=self.base, speed=config.path.speed, roll_free=True if self.roll else None
+            self.file,
+            tool=self.tool,
+            base=self.base,
+            speed=config.path.speed,
+            roll_free=True if self.roll else None,
+            q_start=cell.q_start,
         )
         if program.kind == "script" and (self.reach_map is not None or self.export is not None):
             raise InputError(f"{self.file}: --reach-map and --export are for paths; this is a robot program already")
         if program.kind == "script" and self.arm is not None:
             raise InputError(f"{self.file}: --arm is for paths; the joint angles of a robot program are an arm's own already")
+        program, cell = changed(program, cell, change)
         if self.html is not None or self.png is not None:
             choose_platform()
         with progress() as tell:
-            cell = self._cell(q_start)
             result = dry_run(program, cell, config.motion, fix=not self.no_fix, tell=tell)
             written, trouble = self._write(result, cell)
             extra: dict[str, Any] = {}
@@ -108,7 +129,7 @@ class DryRunCommand(ConfigOptions):
                 extra = {"reach_map": self._map(program.paths[0], cell, config.motion, lambda done: tell("reach map", done))}
                 written.append(self.reach_map)
             if self.export is not None and result.passed:
-                written.append(self._export(result, config.motion, cell))
+                written.append(self._export(result, cell, config.motion))
         if self.json:
             from weldsim.dryrun.verdict import dry_run_json
 
@@ -116,6 +137,16 @@ class DryRunCommand(ConfigOptions):
         else:
             self._print(result, written, trouble)
         return 0 if result.passed else 1
+
+    def _change(self) -> "Change":
+        from weldsim.dryrun.change import Change
+
+        return Change(
+            turn=None if self.turn is None else float(_quantities(self.turn, "rad", 1, "--turn")[0]),
+            lean=None if self.lean is None else _quantities(self.lean, "rad", 2, "--lean"),
+            move=None if self.move is None else _quantities(self.move, "m", 2, "--move"),
+            speed=None if self.speed is None else float(_quantities(self.speed, "m/s", 1, "--speed")[0]),
+        )
 
     def _cell(self, q_start: Any) -> "Cell":
         from weldsim.dryrun.cell import empty_cell, scene_cell
@@ -172,13 +203,17 @@ class DryRunCommand(ConfigOptions):
         write_whole(self.reach_map, reach_picture(found, self.file.stem))  # type: ignore[arg-type] - asked for
         return reach_json(found)
 
-    def _export(self, result: "DryRun", config: "MotionConfig", cell: "Cell") -> Path:
-        """All welds one after the other, each from the start and back to it."""
+    def _export(self, result: "DryRun", cell: "Cell", config: "MotionConfig") -> Path:
+        """All welds one after the other, from the start and back; they may also begin where arms wait, if that way is clear."""
         from weldsim.execution.urscript import script_text
+        from weldsim.motion.sweep import touched
         from weldsim.output import write_whole
+        from weldsim.scene.world import AWAY, HOME
 
+        waiting = (np.asarray(q, float) for q in (HOME, AWAY))
         text = script_text(
             *(trial.trajectory for trial in result.trials if trial.trajectory is not None),
+            starts=[q for q in waiting if touched(q, cell.q_start, cell.collision) is None],
             title=f"{result.source}, {', '.join(trial.name for trial in result.trials)}",
             arm=cell.arm,
             joint_acceleration=config.joint_acceleration,
@@ -203,6 +238,7 @@ class DryRunCommand(ConfigOptions):
                 print(table(rows, ("waypoint", "s", "verdict", "reason")))
             for fix in fixes:
                 print(f"  would pass: {fix.text}")
+                print(f"    with {fix.how}")
             if rows and not fixes and not self.no_fix:
                 print("  no change that was tried would help")
             for note in trial.notes:
@@ -227,17 +263,22 @@ def _row(first: "Verdict", last: "Verdict") -> list[str]:
     return [span, "" if first.s is None else f"{units.to_mm(first.s):.1f} mm", first.why, first.text]
 
 
-def joint_angles(text: str) -> Any:
-    """Six joint angles [rad] from text. Raises InputError."""
+def _quantities(text: str, dimension: str, count: int, option: str) -> Any:
+    """Numbers (count,) in SI from text such as "20 mm, -35 mm". Raises InputError."""
     parts = [part.strip() for part in text.replace(";", ",").split(",")]
-    if len(parts) != 6:
-        raise InputError(f"--start {text!r}: {len(parts)} values, six joint angles are needed, separated by commas", value=text)
-    angles = []
+    if len(parts) != count:
+        raise InputError(f"{option} {text!r}: {len(parts)} values, {count} needed, separated by commas", value=text)
+    values = []
     for part in parts:
         try:
-            angles.append(float(part))
+            values.append(float(part))
         except ValueError:
-            angles.append(units.parse(part, "rad"))
-    if not np.isfinite(angles).all():
-        raise InputError(f"--start {text!r}: an angle is not finite", value=text)
-    return np.array(angles)
+            values.append(units.parse(part, dimension, where=option))
+    if not np.isfinite(values).all():
+        raise InputError(f"{option} {text!r}: a value is not finite", value=text)
+    return np.array(values)
+
+
+def joint_angles(text: str) -> Any:
+    """Six joint angles [rad] from text. Raises InputError."""
+    return _quantities(text, "rad", 6, "--start")

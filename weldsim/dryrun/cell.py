@@ -21,7 +21,8 @@ FIXTURE = "fixture"  # the body that carries the part and what holds it
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cell:
     """Attributes: name; model, compiled; collision, its check; q_start, where the arm stands [rad]; has_part; arm, whose joint
-    angles model and collision take."""
+    angles model and collision take; left_out, clamps and bolts that the scene leaves out; place, where the scene has the part
+    in B [m], None without a scene."""
 
     name: str
     model: Any
@@ -29,6 +30,8 @@ class Cell:
     q_start: Float[ndarray, "6"]
     has_part: bool
     arm: Arm = UR5
+    left_out: tuple[str, ...] = ()
+    place: tuple[float, float] | None = None
 
     def fitted(self, arm: Arm) -> "Cell":
         """The cell with another arm in it, its links where that arm's joints have them; itself where it is the same.
@@ -56,12 +59,12 @@ class Cell:
         return replace(self, model=model, collision=CellCollision(model))
 
     def without(self, body: str) -> "Cell":
-        """A cell in which every collision body whose name begins with `body` has been taken away."""
+        """A cell in which a clamp or bolt, with what belongs to it, has been taken away."""
         import copy
 
         model = copy.copy(self.model)
         for geom in range(model.ngeom):
-            if model.geom(geom).name.startswith(body):
+            if model.geom(geom).name.startswith(f"{body}_"):
                 model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
         return replace(self, model=model, collision=CellCollision(model))
 
@@ -81,6 +84,8 @@ def scene_cell(scene: "SceneConfig", q_start: Float[ndarray, "6"] | None = None)
         collision=CellCollision(world.model),
         q_start=world.start_joints() if q_start is None else q_start,
         has_part=True,
+        left_out=scene.fixture.without,
+        place=(scene.pose.x, scene.pose.y),
     )
 
 

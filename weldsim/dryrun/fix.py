@@ -1,5 +1,6 @@
 """The nearest change after which a job passes: tried on a coarse look first, then applied and the whole job checked again."""
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
@@ -10,7 +11,8 @@ from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell, shifted
 from weldsim.dryrun.program import Program
-from weldsim.dryrun.try_path import FASTEST, quick, try_path
+from weldsim.dryrun.sieve import quick
+from weldsim.dryrun.try_path import FASTEST, try_path
 from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import Fix, Trial
 from weldsim.errors import MotionError
@@ -25,15 +27,18 @@ from weldsim.records import Segment, TorchPath
 TURNS = np.deg2rad([s * a for a in (5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 105, 120, 135, 150, 165, 180) for s in (1, -1)])
 LEANS = np.deg2rad([5.0, 10.0, 15.0, 20.0, 30.0])
 LEADS = (0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.10, 0.15)  # [m] tried for lead-in and lead-out
-LOOSE = "clamp"  # names of what can be taken away begin so
+LOOSE = re.compile(r"clamp_(bolt_)?\d+")  # names of what can be taken away begin so
 DISTANCES = (0.01, 0.02, 0.03, 0.05, 0.075, 0.10, 0.15, 0.20, 0.25, 0.30, 0.40, 0.50)  # [m] the part is moved by, tried in order
 HEADINGS = 12  # directions on the table
 CLOSE = 0.005  # [m] to which the nearest place that does is found
 TABLE = np.array([[-0.60, -0.84], [0.60, 0.20]])  # [m] the table top in B
 FULL_TRIES = 4  # whole checks of changes that passed the coarse look
+WORK = 2.0  # [m] of path in all the whole checks of one kind of change: long paths have fewer
 CANDIDATES = 3  # ways to hold the arm in such a check: what passes with the best of them passes
-FARTHER = (0.0, 0.02)  # [m] by which a part is moved further than the coarse look asks for
-MOVE_TRIES, OUTWARDS = 6, 1.5  # whole checks of places; by so much further away is the next, where one fails
+FARTHER = 0.02  # [m] by which a part is moved further than the coarse look asks for, where that does not do
+MOVE_TRIES = 6  # whole checks of places
+OUTWARDS, FURTHER_OUT = 1.5, 0.04  # by so much, and at least by so much [m], further away is the next, where one fails
+FEW = 20  # motions of a program that are quickly tried
 
 Progress = Callable[[float], None]
 
@@ -89,9 +94,17 @@ def applied(fix: Fix, path: TorchPath, cell: Cell, config: MotionConfig) -> tupl
 def _slower(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> tuple[Fix, ...]:
     speed = 0.99 * min(float(path.speed.max()), FASTEST) * (trial.slowest or 1.0)
     for _ in range(FULL_TRIES):
+        speed = float(f"{speed:.3g}")  # as it is told
         tried = try_path(_with(path, speed=np.minimum(path.speed, speed)), trial.name, cell, config)
         if tried.passed:
-            return (Fix(kind="slower", text=f"weld at {1e3 * speed:.3g} mm/s at most", speed=speed),)
+            return (
+                Fix(
+                    kind="slower",
+                    text=f"weld at {1e3 * speed:.3g} mm/s at most",
+                    speed=speed,
+                    how=f'--speed "{1e3 * speed:.3g} mm/s"',
+                ),
+            )
         speed *= 0.95 * (tried.slowest or 0.5)
     return ()
 
@@ -104,8 +117,8 @@ def _turn(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
             continue
         if try_path(changed, trial.name, cell, config).passed:
             text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg all along"
-            return [Fix(kind="turn about the wire", text=text, turn=float(turn))]
-        if (tries := tries + 1) >= FULL_TRIES:
+            return [Fix(kind="turn about the wire", text=text, turn=float(turn), how=_turning(turn))]
+        if (tries := tries + 1) >= _tries(path, FULL_TRIES):
             break
     return []
 
@@ -113,9 +126,11 @@ def _turn(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
 def _taken_away(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
     """Without the clamps that are touched, one after the other, where that is all that stands in the way."""
     away: list[str] = []
+    before = cell
     for _ in range(FULL_TRIES):
         failure = trial.failure
-        clamp = next((c for c in (failure.first, failure.second) if c.startswith(LOOSE)), "") if failure is not None else ""
+        touching = () if failure is None else (LOOSE.match(name) for name in (failure.first, failure.second))
+        clamp = next((loose.group() for loose in touching if loose), "")
         if failure is None or not clamp:
             break
         away.append(clamp)
@@ -123,7 +138,14 @@ def _taken_away(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig)
         trial = try_path(path, trial.name, cell, config)
     if not away or not trial.passed:
         return []
-    return [Fix(kind="take away", text=f"take {' and '.join(away)} out of the torch's way", body=", ".join(away))]
+    return [
+        Fix(
+            kind="take away",
+            text=f"take {' and '.join(away)} out of the torch's way",
+            body=", ".join(away),
+            how=_leaving_out(before, away),
+        )
+    ]
 
 
 def _lead(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
@@ -135,7 +157,8 @@ def _lead(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
         if try_path(path, trial.name, cell, replace(config, approach=length)).passed:
             word = "shorten" if length < config.approach else "lengthen"
             text = f"{word} the lead-in and lead-out to {1e3 * length:.0f} mm (motion.approach, {1e3 * config.approach:.0f} mm now)"
-            return [Fix(kind="lead-in", text=text, approach=length)]
+            how = f'--set motion.approach="{1e3 * length:g} mm"'
+            return [Fix(kind="lead-in", text=text, approach=length, how=how)]
     return []
 
 
@@ -149,8 +172,9 @@ def _lean(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
             if try_path(changed, trial.name, cell, config).passed:
                 which = "work" if lean[0] else "travel"
                 text = f"add {np.rad2deg(lean[0] + lean[1]):+.0f} deg of {which} angle"
-                return [Fix(kind="lean the torch", text=text, lean=(float(lean[0]), float(lean[1])))]
-            if (tries := tries + 1) >= FULL_TRIES:
+                how = f'--lean "{np.rad2deg(lean[0]):.0f} deg, {np.rad2deg(lean[1]):.0f} deg"'
+                return [Fix(kind="lean the torch", text=text, lean=(float(lean[0]), float(lean[1])), how=how)]
+            if (tries := tries + 1) >= _tries(path, FULL_TRIES):
                 return []
     return []
 
@@ -168,23 +192,49 @@ def _move(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell:
         tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
         if np.linalg.norm(move) < least or not _quick(_with(path, X_BT=shifted(path.X_BT, move)), trial, cell.moved(move), config):
             continue
-        move = _nearest(path, trial, move, cell, config)
-        for further in FARTHER:
-            longer = move * (1.0 + further / float(np.linalg.norm(move)))
-            if passes(path, longer, trial.name, cell, config):
-                return [moved_fix(longer)]
-            if (tries := tries + 1) >= MOVE_TRIES:
+        nearest = _nearest(path, trial, move, cell, config)
+        longer = nearest * (1.0 + FARTHER / float(np.linalg.norm(nearest)))
+        for way in (nearest, longer if tries == 0 else move):
+            way = told(way)
+            if passes(path, way, trial.name, cell, config):
+                return [moved_fix(way, cell.place)]
+            if (tries := tries + 1) >= _tries(path, MOVE_TRIES):
                 return []
-            least = OUTWARDS * float(np.linalg.norm(longer))
+            length = float(np.linalg.norm(way))
+            least = max(OUTWARDS * length, length + FURTHER_OUT)
     return []
 
 
-def moved_fix(move: Float[ndarray, "3"]) -> Fix:
-    """The change of place in words."""
+def _tries(path: TorchPath, most: int) -> int:
+    """How many whole checks are worth the time."""
+    return int(np.clip(WORK / max(float(path.s[-1] - path.s[0]), 1e-3), 2, most))
+
+
+def told(move: Float[ndarray, "3"]) -> Float[ndarray, "3"]:
+    """The move as it is told: in tenths of a millimetre."""
+    return np.round(move, 4) + 0.0
+
+
+def moved_fix(move: Float[ndarray, "3"], place: tuple[float, float] | None = None) -> Fix:
+    """The change of place in words; place, where the scene has the part now [m]."""
     x, y = 1e3 * move[0], 1e3 * move[1]
     distance = 1e3 * float(np.linalg.norm(move))
     text = f"move the part by {distance:.0f} mm: ({x:+.0f}, {y:+.0f}) mm along x and y of the base"
-    return Fix(kind="move the part", text=text, move=(float(move[0]), float(move[1]), float(move[2])))
+    how = f'--move "{x:.1f} mm, {y:.1f} mm"'
+    if place is not None:
+        there = 1e3 * (np.array(place) + move[:2])
+        how += f'; once the part is there, in the scene\'s [pose]: x = "{there[0]:.1f} mm", y = "{there[1]:.1f} mm"'
+    return Fix(kind="move the part", text=text, move=(float(move[0]), float(move[1]), float(move[2])), how=how)
+
+
+def _turning(turn: float) -> str:
+    return f'--turn "{np.rad2deg(turn):.0f} deg"'
+
+
+def _leaving_out(cell: Cell, away: list[str]) -> str:
+    """The scene's lines without what is taken away."""
+    names = ", ".join(f'"{name}"' for name in (*cell.left_out, *away))
+    return f"--set 'scene.fixture.without=[{names}]'; or in the scene's [fixture]: without = [{names}]"
 
 
 def passes(path: TorchPath, move: Float[ndarray, "3"], name: str, cell: Cell, config: MotionConfig) -> bool:
@@ -231,7 +281,7 @@ def _cut(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> lis
         return []
     where = ", ".join(f"{1e3 * s:.0f}" for s in trial.split)
     text = f"weld it in {len(pieces)} pieces, cut at s = {where} mm (motion.pieces = {len(pieces)})"
-    return [Fix(kind="cut the weld", text=text, cut=trial.split)]
+    return [Fix(kind="cut the weld", text=text, cut=trial.split, how=f"--set motion.pieces={len(pieces)}")]
 
 
 def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress = lambda done: None) -> tuple[Fix, ...]:
@@ -240,21 +290,22 @@ def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress 
     if failure is None or failure.why in ("stale start", "speed") or all(motion.X_BT is None for motion in program.motions):
         return ()
     found: list[Fix] = []
-    turns = ((turn, _changed(program, turn=float(turn))) for turn in TURNS)
+    turns = ((turn, changed_program(program, turn=float(turn))) for turn in TURNS)
     for turn, changed in islice((pair for pair in turns if _held(pair[1], failure.index, cell)), FULL_TRIES):
         if try_script(changed, cell).passed:
             text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg at every pose"
-            found.append(Fix(kind="turn about the wire", text=text, turn=float(turn)))
+            found.append(Fix(kind="turn about the wire", text=text, turn=float(turn), how=_turning(turn)))
             break
     points = np.stack([motion.X_BT.p for motion in program.motions if motion.X_BT is not None])
     tries = 0
     for k, move in enumerate(candidates(points)):
         tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
-        changed, there = _changed(program, move=move), cell.moved(move)
+        move = told(move)
+        changed, there = changed_program(program, move=move), cell.moved(move)
         if not _held(changed, failure.index, there):
             continue
         if try_script(changed, there).passed:
-            found.append(moved_fix(move))
+            found.append(moved_fix(move, cell.place))
             break
         if (tries := tries + 1) >= FULL_TRIES:
             break
@@ -262,13 +313,15 @@ def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress 
 
 
 def _held(program: Program, index: int, cell: Cell) -> bool:
-    """Whether some posture is clear at the target of one motion."""
+    """Whether the program gets past the target of one motion; of a late one, whether some posture there is clear."""
+    if index < FEW:
+        return try_script(replace(program, motions=program.motions[: index + 1]), cell).passed
     motion = program.motions[index]
     solutions = motion.q[None] if motion.X_BT is None else inverse(motion.X_BT @ X_FT.inverse())  # type: ignore[index]
     return any(not cell.collision.touches(q) for q in solutions)
 
 
-def _changed(program: Program, turn: float = 0.0, move: Float[ndarray, "3"] | None = None) -> Program:
+def changed_program(program: Program, turn: float = 0.0, move: Float[ndarray, "3"] | None = None) -> Program:
     """The program with every pose turned about the wire and moved; joint targets stay."""
     shift = np.zeros(3) if move is None else move
     motions = tuple(
@@ -285,7 +338,7 @@ def turned_about_wire(X_BT: Transform, turn: float) -> Transform:
 
 def _quick(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> bool:
     try:
-        return cell.collision(cell.q_start) is None and quick(path, cell, config, first=trial.s_worst)
+        return cell.collision(cell.q_start) is None and quick(path, cell, config, first=trial.s_worst, air=True)
     except MotionError:
         return False
 

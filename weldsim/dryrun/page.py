@@ -46,7 +46,9 @@ def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[
     parts = [f"<section><h2>{escape(trial.name)}: {'passed' if failure is None else 'would fail'}</h2><p>{escape(said)}</p>"]
     if failure is not None:
         parts.append(f'<ul class="reasons"><li>{escape(place(failure))}: {escape(failure.why)}: {escape(failure.text)}</li></ul>')
-        listed = "".join(f"<li>{escape(fix.text)} (applied and checked: passes)</li>" for fix in fixes)
+        listed = "".join(
+            f"<li>{escape(fix.text)} (applied and checked: passes)<br><code>{escape(fix.how)}</code></li>" for fix in fixes
+        )
         parts.append(f"<h2>What would help</h2><ul>{listed}</ul>" if fixes else "<p>No change that was tried would help.</p>")
     parts += [f"<p>{escape(note)}</p>" for note in trial.notes]
     parts.append("</section>")

@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell, shifted
 from weldsim.dryrun.fix import TABLE
-from weldsim.dryrun.try_path import quick
+from weldsim.dryrun.sieve import quick
 from weldsim.errors import MotionError
 from weldsim.motion.config import MotionConfig
 from weldsim.records import TorchPath

@@ -30,6 +30,7 @@ def read_program(
     base: Base = "controller",
     speed: MetrePerSecond = 0.008,
     roll_free: bool | None = None,
+    q_start: Float[ndarray, "6"] | None = None,
 ) -> Program:
     """What the file asks of the arm.
 
@@ -40,6 +41,7 @@ def read_program(
         base: in which base a CSV's poses are; `base_link` is the controller's turned half a turn about z.
         speed: torch speed where the file names none [m/s].
         roll_free: whether the torch may turn about its wire; by default a path's may, a robot program's may not.
+        q_start: where the arm stands [rad], for a script that asks.
     Raises:
         InputError: a file that is missing, malformed, in millimetres, with numbers that are not finite, or too short.
     """
@@ -60,7 +62,7 @@ def read_program(
         return Program(source=path.name, kind="path", paths=paths, names=tuple(seam["id"] for seam in document["seams"]))
     text = _text(path)
     if path.suffix.lower() in SCRIPTS:
-        return parse_script(text, source=str(path), X_FT=None if tool is None else _mount(tool))
+        return parse_script(text, source=str(path), X_FT=None if tool is None else _mount(tool), q_start=q_start)
     if path.suffix.lower() in (".csv", ".txt"):
         return _csv(path, text, tool, base, speed, bool(roll_free))
     raise InputError(f"{path}: .json (weldsim.path/1), .csv (UR poses) or .script (URScript) is needed", path=str(path))

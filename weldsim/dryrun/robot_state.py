@@ -13,15 +13,15 @@ from weldsim.urscript.values import Pose
 
 
 class RobotState:
-    """Functions of a program that ask where the arm is. Where it stands before its first motion is not known.
+    """Functions of a program that ask where the arm is. Where it stands before its first motion is known where it was said.
 
     Attributes:
         mount: X_FT of the TCP in force.
     """
 
-    def __init__(self, mount: Transform) -> None:
+    def __init__(self, mount: Transform, q_start: np.ndarray | None = None) -> None:
         self.mount = mount
-        self._q: np.ndarray | None = None  # [rad] the last joint angles that are known
+        self._q = q_start  # [rad] the last joint angles that are known
         self._since: list[Transform] = []  # X_BF of the motions after them
 
     def to_joints(self, q: list[float]) -> None:

@@ -15,13 +15,13 @@ from weldsim.motion.collision import Touch
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.motion.rail import Rail, make_rail
-from weldsim.motion.rungs import Refusal, Rungs, make_rungs, places
+from weldsim.motion.rungs import Refusal, Rungs, make_rungs
 from weldsim.records import TorchPath
 
 FINE = 0.001  # [m] to which the first place that fails is found
 FASTEST = 0.25  # [m/s] greatest torch speed with the arc, the safety limit of manual mode
 JUMP = np.deg2rad(2.0)  # [rad] two poses may always differ by so much
-COARSE_ROLLS, EXACT_ROLLS = 18, 360  # rotations about the wire of a coarse look, and of the look that refuses
+EXACT_ROLLS = 360  # rotations about the wire of the look that refuses
 
 
 def try_path(path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Trial:
@@ -214,26 +214,3 @@ def _planned(base: Trial, path: TorchPath, plan: MotionPlan, config: MotionConfi
     verdicts = list(_all(path))
     verdicts[index] = _failing(verdicts[index], _Fault(index=index, why="speed", text=text))
     return replace(out, verdicts=tuple(verdicts), s_worst=plan.slowest_at, p_worst=path.X_BT.p[index])
-
-
-def quick(
-    path: TorchPath, cell: Cell, config: MotionConfig, length: float = 0.03, turn: float = 0.25, first: float | None = None
-) -> bool:
-    """Whether a coarse look finds a sweep of the arm along the path: a sieve for many places, not a verdict.
-
-    Args:
-        length, turn: between places, at most [m], [rad].  first: arc length to be looked at before all others [m].
-    """
-    from weldsim.motion.ladder import climb
-
-    def blocked(q: Float[ndarray, "6"]) -> str | None:
-        return "something" if cell.collision.touches(q) else None
-
-    rail = make_rail(path, config)
-    # Its ends first, and where it failed before: most places that will not do fail there.
-    suspects = [] if first is None else [first]
-    coarse = replace(config, rolls=min(config.rolls, COARSE_ROLLS), clearance=0.0)
-    if make_rungs(rail, cell.arm, coarse, blocked, at=np.unique([rail.s[0], rail.s[-1], *suspects])).first_refused is not None:
-        return False
-    rungs = make_rungs(rail, cell.arm, coarse, blocked, at=places(rail, length, turn))
-    return rungs.first_refused is None and climb(rungs, cell.q_start, cell.arm, config) is not None

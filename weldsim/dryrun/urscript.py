@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from weldsim.dryrun.program import Command, Motion, Program
 from weldsim.dryrun.robot_state import RobotState
@@ -28,22 +30,26 @@ FURTHEST, LONGEST_TOOL, LONGEST_TURN = 3.0, 1.0, 2 * np.pi + 1e-6  # [m] of a po
 LARGEST_ANGLE = 8 * np.pi  # [rad] of a joint
 
 
-def parse_script(text: str, *, source: str, X_FT: Transform | None = None) -> Program:
+def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_start: Float[ndarray, "6"] | None = None) -> Program:
     """The motions of a program, poses turned into torch poses.
 
     Args:
         text: the program.  source: its name, for errors.
         X_FT: flange to the frame that poses are of, in place of what the program sets.
+        q_start: where the arm stands when it begins [rad], for programs that ask; None where that is not known.
     Raises:
         InputError: a line that cannot be read, a function nobody knows, a target that is not finite or in millimetres, motions
             that cannot be told beforehand, no motion.
     """
-    recorder = _Recorder(X_FT)
+    recorder = _Recorder(X_FT, q_start)
     try:
         recorder.run(compile_program(text.replace("\r\n", "\n").replace("\r", "\n"), recorder.builtins()))
     except ScriptError as error:
         where = f"line {error.line}: " if error.line else ""
         raise InputError(f"{source}: {where}{error.reason}", path=source, line=error.line) from None
+    if not recorder.motions and recorder.halted:
+        said = f": {recorder.shown}" if recorder.shown else ""
+        raise InputError(f"{source}: halts before it moves{said}", path=source)
     if not recorder.motions:
         raise InputError(f"{source}: makes no movej, movel, movep or servoj; there is nothing to check", path=source)
     if len(recorder.motions) < 2:
@@ -77,10 +83,12 @@ class _Unknown:
 
 
 class _Recorder:
-    """A program's functions. Attributes: motions, what they wrote down; state, of the robot by then; pauses [s]; notes."""
+    """A program's functions. Attributes: motions, what they wrote down; state, of the robot by then; pauses [s]; notes;
+    halted, whether it said so; shown, the last popup."""
 
-    def __init__(self, fixed: Transform | None) -> None:
-        self.fixed, self.state = fixed, RobotState(fixed or X_FT)
+    def __init__(self, fixed: Transform | None, q_start: Float[ndarray, "6"] | None) -> None:
+        self.fixed, self.state = fixed, RobotState(fixed or X_FT, q_start)
+        self.halted, self.shown = False, ""
         self.motions: list[Motion] = []
         self.notes: list[str] = []
         self.pauses = 0.0
@@ -99,7 +107,7 @@ class _Recorder:
             for _ in names["main"]():
                 pass
         except _HaltError:
-            pass
+            self.halted = True
         except ScriptError as error:
             raise ScriptError(error.reason, error.line or self._line(error)) from None
         except (TypeError, ValueError, ArithmeticError, NameError, LookupError, RecursionError) as error:
@@ -193,7 +201,9 @@ class _Recorder:
         return lambda *_, **__: _Unknown(name)
 
     def _passed_over(self, name: str) -> Callable:
-        def silent(*_: object, **__: object) -> str:
+        def silent(*said: object, **__: object) -> str:
+            if name == "popup" and said:
+                self.shown = " ".join(str(said[0]).split())[:200]
             self._note(name, f"line {self._line()}: {name} does not move the arm and is passed over")
             return ""
 

@@ -56,6 +56,7 @@ class Fix:
         lean: added work angle and travel angle [rad].  body: what is taken away.
         turn: about the wire [rad].  move: of the part, in the base [m].  speed: of the weld [m/s].  cut: arc lengths [m].
         approach: length of lead-in and lead-out [m], `motion.approach`.
+        how: what makes the change, options to be added to the command or lines of the scene's file.
     """
 
     kind: Literal["turn about the wire", "lean the torch", "take away", "move the part", "slower", "cut the weld", "lead-in"]
@@ -67,6 +68,7 @@ class Fix:
     speed: float = 0.0
     cut: tuple[float, ...] = ()
     approach: float = 0.0
+    how: str = ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -178,6 +180,7 @@ def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
                 "speed": fix.speed,
                 "cut": list(fix.cut),
                 "approach": fix.approach,
+                "how": fix.how,
             }
             for fix in fixes
         ],

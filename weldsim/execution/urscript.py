@@ -6,6 +6,7 @@ nominal one put the torch some millimetres off. Approach and lead-out are straig
 joints (movej).
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -20,11 +21,13 @@ HOLD = 0.2  # [s] that the last target is repeated, until the arm has caught up 
 NAME = "weldsim_job"
 FIRST_SPEED = 0.2  # [rad/s] of the leading joint, to where the program starts: the torch stays below 0.25 m/s however far it is
 REST, STAYED = 1e-6, 1e-6  # [rad/s] below which the arm is at rest, [rad] by which it has not moved
+NEAR = 0.01  # [rad] of each joint from where the program starts, at most
 LEAD_ACCELERATION = 0.5  # [m/s2] of the straight lead-in and lead-out
 
 
 def script_text(
     *trajectories: JointTrajectory,
+    starts: Sequence[Float[ndarray, "6"]] = (),
     title: str = "weldsim",
     arm: Arm = UR5,
     arc_output: int = 0,
@@ -37,6 +40,8 @@ def script_text(
 
     Args:
         trajectories: as planned and checked, at least one; at rest where their segments meet.
+        starts: joint angles [rad] from which a straight joint move to the start has been checked, beside the start itself. With the
+            arm anywhere else the program says so on the pendant and halts before it moves.
         title: of the program, in a comment.  arm: whose joint angles they are; its torch's TCP is set.
         arc_output: standard digital output that strikes the arc.
         joint_acceleration: of air moves [rad/s2], which are as fast as planned.  lead_speed: of lead-in and lead-out [m/s].
@@ -45,10 +50,11 @@ def script_text(
     start = ", ".join(f"{v:.1f}" for v in np.rad2deg(trajectories[0].q[0]))
     lines = [
         f"# {' '.join(title.split())}",
-        "# Checked with the arm starting at the joint angles of the first movej: from anywhere else its way there is not.",
-        f"# They are {start} deg.",
+        f"# Checked with the arm starting at {start} deg (base to wrist 3):",
+        "# with the arm anywhere else it does not move, unless its way there has been checked too.",
         f"# Send it to a script port as it is. In a script file of PolyScope, add the line {NAME}() at its end.",
         f"def {NAME}():",
+        *_guard(start, (trajectories[0].q[0], *starts)),
         f"  set_tcp(p[{tcp}])",
         f"  set_standard_digital_out({arc_output}, False)",
     ]
@@ -71,6 +77,28 @@ def script_text(
                 pose = ", ".join(f"{v:.9f}" for v in (*X_BT.p, *X_BT.rotation_vector))
                 lines.append(f"  movel(p[{pose}], a={LEAD_ACCELERATION:g}, v={lead_speed:g})")
     return "\n".join([*lines, "end", ""])
+
+
+def _guard(start: str, places: tuple[Float[ndarray, "6"], ...]) -> list[str]:
+    """Lines that halt the program before it moves, unless every joint is within NEAR of one of the places [rad]."""
+    lines = [
+        "  def stands_at(q, there):",
+        "    local i = 0",
+        "    while i < 6:",
+        f"      if norm(q[i] - there[i]) > {NEAR:g}:",
+        "        return False",
+        "      end",
+        "      i = i + 1",
+        "    end",
+        "    return True",
+        "  end",
+        "  q_now = get_actual_joint_positions()",
+        "  ready = False",
+    ]
+    for place in places:
+        lines.append(f"  ready = ready or stands_at(q_now, {_joints(place)})")
+    said = f"The arm is not where this program starts. Move its joints to {start} deg, then play it again."
+    return [*lines, "  if not ready:", f'    popup("{said}", title="weldsim", error=True)', "    halt", "  end"]
 
 
 def _swings(trajectory: JointTrajectory, rows: slice) -> list[tuple[Float[ndarray, "6"], float]]:

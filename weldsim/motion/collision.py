@@ -65,7 +65,7 @@ class CellCollision:
         deepest = int(distance.argmin())
         if distance[deepest] >= 0:
             return None
-        first, second = (self._model.geom(int(g)).name.removesuffix("_collision") or f"geom {g}" for g in pairs[deepest])
+        first, second = (_said(self._model.geom(int(g)).name) or f"geom {g}" for g in pairs[deepest])
         return Touch(first=first, second=second, depth=-float(distance[deepest]))
 
     def touches(self, q: Float[ndarray, "6"]) -> bool:
@@ -92,6 +92,11 @@ class CellCollision:
         for model in (self._model, self._wide):
             index = model.body(body).id
             model.body_pos[index], model.body_quat[index] = position, quaternion
+
+
+def _said(name: str) -> str:
+    """A geom's name as people are told it."""
+    return name.removesuffix("_collision").removesuffix("_core")
 
 
 def _depth(model: Any, body: int) -> int:

@@ -69,12 +69,18 @@ class FixtureConfig:
         clamps: step clamps on the part's long sides: 0, 2 or 4; one's own part has none.
         overlap: of each clamp's nose over the part [m].
         bolts: bolt heads standing on the part's level surface, as clutter: 0 to 6.
+        without: clamps and bolts that are left out, as reports name them: "clamp_2", "clamp_bolt_0".
     """
 
     stand: bool = True
     clamps: Literal[0, 2, 4] = 4
     overlap: Metre = 0.018
     bolts: int = 0
+    without: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.clamps not in (0, 2, 4):
+            raise SceneError(f"fixture: {self.clamps} clamps; 0, 2 or 4 can be placed", key="clamps", limit=4)
 
 
 @dataclass(frozen=True)

@@ -22,16 +22,20 @@ def add_fixture(spec: Spec, base: Body, part: Body, config: FixtureConfig, workp
     """Clamps and bolts in the part's body (frame P), what stands on the table in the base's (frame B).
 
     Raises:
-        SceneError: a clamp that reaches too far over the part or past its edge, bolts on a bent part or too many.
+        SceneError: a clamp that reaches too far over the part or past its edge, bolts on a bent part or too many, or a name to
+            be left out that nothing has.
     """
     raised = float(X_BP.points(workpiece.base_corners)[:, 2].min()) > RAISED
     places = workpiece.clamp_places(config.clamps)
+    _check_left_out(config, len(places))
     for i, place in enumerate(places):
+        if f"clamp_{i}" in config.without:
+            continue
         _check_overlap(config.overlap, place)
         _add_clamp(part, f"clamp_{i}", place, config.overlap, steps=not raised)
         if raised and config.stand:
             _add_post(base, f"clamp_{i}_post", X_BP, place)
-    _add_bolts(part, config.bolts, workpiece.flat_top)
+    _add_bolts(part, config, workpiece.flat_top)
     if config.stand:
         add = _add_legs if raised else _add_wedge
         add(spec, base, X_BP, workpiece.base_corners)
@@ -80,12 +84,23 @@ def _add_post(base: Body, name: str, X_BP: Transform, place: ClampPlace) -> None
     geom.quat = quat
 
 
-def _add_bolts(part: Body, count: int, top: tuple[float, float] | None) -> None:
+def _check_left_out(config: FixtureConfig, clamps: int) -> None:
+    names = [*(f"clamp_{i}" for i in range(clamps)), *(f"clamp_bolt_{i}" for i in range(config.bolts))]
+    unknown = [name for name in config.without if name not in names]
+    if unknown:
+        there = ", ".join(names) or "no clamp and no bolt"
+        raise SceneError(f"fixture: without {unknown[0]!r}: this scene has {there}", key="without", name=unknown[0])
+
+
+def _add_bolts(part: Body, config: FixtureConfig, top: tuple[float, float] | None) -> None:
+    count = config.bolts
     if not 0 <= count <= len(BOLT_PLACES):
         raise SceneError(f"fixture: {count} bolts; at most {len(BOLT_PLACES)}", key="bolts", limit=len(BOLT_PLACES))
     if count and top is None:
         raise SceneError("fixture: bolts stand on a level surface, and this part has none; use bolts = 0", key="bolts", limit=0)
     for i, (u, v) in enumerate(BOLT_PLACES[:count]):
+        if f"clamp_bolt_{i}" in config.without:
+            continue
         x, y = u * top[0], v * top[1]  # type: ignore[index] - refused above
         name = f"clamp_bolt_{i}"
         rod(part, f"{name}_washer", (x, y, 0.0), (x, y, 0.002), 0.010, "zinc")

@@ -20,6 +20,9 @@ def parse(text: str) -> tuple[tree.Statement, ...]:
         raise ScriptError("nested too deeply", parser.line) from None
 
 
+_CLOSING = (",", ")", "]")  # symbols after which an expression is over
+
+
 class _Parser:
     def __init__(self, found: list[Token]) -> None:
         self._tokens, self._at, self._depth = found, 0, 0
@@ -139,6 +142,8 @@ class _Parser:
 
     def expression(self, level: int = 0) -> tree.Expression:
         """One expression of operators at `level` and tighter."""
+        if level == 0 and (number := self._plain_number()) is not None:
+            return number
         if level == len(_BINARY):
             return self._unary()
         if level == _COMPARISON and self._sees("not"):
@@ -149,6 +154,19 @@ class _Parser:
             operator = self._take()
             left = tree.Binary(operator.line, operator.text, left, self.expression(level + 1))
         return left
+
+    def _plain_number(self) -> tree.Expression | None:
+        """A number with nothing to be worked out, as most of a long program's are; None for anything else."""
+        minus = self._next.text == "-" and self._next.kind == "symbol"
+        # The last token is the end of the text: there is always one after a number.
+        if minus and self._tokens[self._at + 1].kind != "number":
+            return None
+        token = self._tokens[self._at + minus]
+        if token.kind != "number" or self._tokens[self._at + minus + 1].text not in _CLOSING:
+            return None
+        self._at += minus + 1
+        value = tree.Constant(token.line, _number(token))
+        return tree.Unary(token.line, "-", value) if minus else value
 
     def _unary(self) -> tree.Expression:
         if (operator := self._accept("-", "+", "not")) is not None:

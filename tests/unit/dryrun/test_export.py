@@ -14,7 +14,8 @@ from weldsim.curves import project
 from weldsim.dryrun.cell import empty_cell, scene_cell, shifted
 from weldsim.dryrun.reach import reach_map
 from weldsim.dryrun.read import read_program
-from weldsim.dryrun.try_path import quick, try_path
+from weldsim.dryrun.sieve import quick
+from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.try_script import try_script
 from weldsim.execution.urscript import script_text
 from weldsim.kinematics import torch_pose
@@ -32,7 +33,7 @@ def test_the_exported_program_follows_the_path(tmp_path):
     assert trial.trajectory is not None
     file = tmp_path / "weld.script"
     file.write_text(script_text(trial.trajectory))
-    program = read_program(file)
+    program = read_program(file, q_start=START)
     again = try_script(program, cell)
     assert again.passed, again.failure
     tips = torch_pose(again.q[again.arc_on]).p

@@ -1,0 +1,55 @@
+"""A change asked for by the user, as a report names it: torch turned or leaned, part moved, weld slowed down."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from weldsim.dryrun.cell import Cell, shifted
+from weldsim.dryrun.fix import changed_program, leaned, turned_about_wire
+from weldsim.dryrun.program import Program
+from weldsim.errors import InputError
+from weldsim.records import TorchPath
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """Attributes: turn about the wire [rad]; lean, added work and travel angle [rad]; move of part and job in B [m]; speed of the
+    weld at most [m/s]; each None where it stays as it is."""
+
+    turn: float | None = None
+    lean: Float[ndarray, "2"] | None = None
+    move: Float[ndarray, "2"] | None = None
+    speed: float | None = None
+
+
+def changed(program: Program, cell: Cell, change: Change) -> tuple[Program, Cell]:
+    """The program and the cell with the change made: all its welds, or all its poses.
+
+    Raises:
+        InputError: a change that a robot program cannot be given, or a speed of zero or less.
+    """
+    if change.speed is not None and not change.speed > 0:
+        raise InputError(f"--speed: {change.speed:g} m/s must be over 0", value=change.speed)
+    move = None if change.move is None else np.array([*change.move, 0.0])
+    if program.kind == "script":
+        if change.lean is not None or change.speed is not None:
+            raise InputError(f"{program.source}: --lean and --speed are for paths; a robot program names its own")
+        program = changed_program(program, turn=change.turn or 0.0, move=move)
+    else:
+        program = replace(program, paths=tuple(_changed_path(path, change, move) for path in program.paths))
+    return program, cell if move is None else cell.moved(move)
+
+
+def _changed_path(path: TorchPath, change: Change, move: Float[ndarray, "3"] | None) -> TorchPath:
+    X_BT, speed = path.X_BT, path.speed
+    if change.turn is not None:
+        X_BT = turned_about_wire(X_BT, change.turn)
+    if change.lean is not None:
+        X_BT = leaned(X_BT, float(change.lean[0]), float(change.lean[1]))
+    if move is not None:
+        X_BT = shifted(X_BT, move)
+    if change.speed is not None:
+        speed = np.minimum(speed, change.speed)
+    return replace(path, X_BT=X_BT, speed=speed)
