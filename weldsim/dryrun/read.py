@@ -1,5 +1,6 @@
 """Files to programs: `weldsim.path/1`, CSV of UR poses, URScript; anything else is refused in one line."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ SCRIPTS = (".script", ".urscript", ".ur")
 LONGEST_TURN = 2 * np.pi + 1e-6  # [rad] of a rotation vector
 SHORTEST = 1e-6  # [m] of a path
 FURTHEST = 3.0  # [m] from the base: further is a unit mistaken
+POSE = re.compile(r"\s*p?\[(.*)\]\s*")  # a pose as robot programs write it
 HALF_TURN = Transform("BB", np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
 
 
@@ -190,6 +192,10 @@ def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> N
 def _cells(row: str) -> list[str]:
     """A row's cells, between semicolons or tabs (numbers may then have decimal commas), commas, or blanks."""
     mark = next((mark for mark in (";", "\t", ",") if mark in row), None)
+    if (written := POSE.fullmatch(row)) is not None:
+        row = written.group(1)
+    if mark is not None:
+        row = row.rstrip().removesuffix(mark)  # some programs end every row with one
     cells = row.split(mark)
     return [cell.strip().strip('"').replace(",", ".") for cell in cells]
 

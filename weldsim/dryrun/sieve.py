@@ -19,6 +19,7 @@ from weldsim.records import TorchPath
 ROLLS = 18  # rotations about the wire that are tried
 LENGTH, TURN = 0.03, 0.25  # [m], [rad] of the torch between the places looked at first
 BETWEEN = 0.004  # [m] between those looked at along a sweep that was found
+ROAMS = 200  # tries of the search for a way through the air
 SWEEPS = 2  # that are looked at closely
 
 
@@ -91,7 +92,7 @@ def _cut_off(rail: Rail, hold: Hold, cell: Cell, config: MotionConfig) -> bool:
         ends.append((hold.q[-1], float(rail.s[-1]), True))
     try:
         for q, s, back in ends:
-            air_moves(cell.q_start, q, s, cell.arm, config, cell.collision, back=back)
+            air_moves(cell.q_start, q, s, cell.arm, config, cell.collision, back=back, tries=ROAMS)
     except MotionError:
         return True
     return False

@@ -26,6 +26,7 @@ from weldsim.urscript.numbers import NumberFunctions
 from weldsim.urscript.values import OPERATIONS, number
 
 TURNS = 10_000  # of all loops together; more is a program that does not end
+LOOKED_AFTER, REPEATS, LONGEST_ROUND = 1000, 4, 500  # turns; rounds that must be alike, and motions of one at most
 FURTHEST, LONGEST_TOOL, LONGEST_TURN = 3.0, 1.0, 2 * np.pi + 1e-6  # [m] of a pose from the base, of a TCP from the flange; [rad]
 LARGEST_ANGLE = 8 * np.pi  # [rad] of a joint
 
@@ -220,8 +221,30 @@ class _Recorder:
 
     def _spin(self) -> None:
         self.turns += 1
+        if self.turns % LOOKED_AFTER == 0:
+            self._stop_repeating()
         if self.turns > TURNS:
             raise ScriptError(f"while: over {TURNS} turns; a program that does not end by itself cannot be told beforehand")
+
+    def _stop_repeating(self) -> None:
+        """Ends a program that does the same for ever, such as PolyScope's own main loop, after its second round; one that
+        only ever goes to one place is left to run out."""
+        told = [_told(motion) for motion in self.motions]
+        if len(set(told[-LONGEST_ROUND:])) < 2:
+            return
+        for period in range(2, min(LONGEST_ROUND, len(told) // REPEATS) + 1):
+            if all(told[-k] == told[-k - period] for k in range(1, (REPEATS - 1) * period + 1)):
+                last = len(told) - REPEATS * period
+                while last > 0 and told[last - 1] == told[last - 1 + period]:
+                    last -= 1
+                kept = self.motions[: last + 2 * period]
+                self.pauses *= len(kept) / len(self.motions)
+                self.motions[:] = kept
+                self._note(
+                    "rounds",
+                    f"line {kept[-1].line}: the program repeats itself over and over; two rounds are checked, and nothing after",
+                )
+                raise _HaltError
 
     def _line(self, error: Exception | None = None) -> int | None:
         """The line of the program that runs, or in which an error arose."""
@@ -237,6 +260,12 @@ class _Recorder:
                 found = self.lines[trace.tb_lineno]
             trace = trace.tb_next
         return found
+
+
+def _told(motion: Motion) -> tuple[object, ...]:
+    """All that makes one motion different from another."""
+    targets = (None if motion.q is None else motion.q.tobytes(), None if motion.X_BT is None else motion.X_BT.matrix.tobytes())
+    return (motion.command, motion.line, motion.arc, motion.t, motion.speed, motion.acceleration, *targets)
 
 
 def _refusing(reason: str) -> Callable:

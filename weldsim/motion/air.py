@@ -29,12 +29,15 @@ def air_moves(
     config: MotionConfig,
     blocked: Blocked | None,
     back: bool = False,
+    tries: int = ROAMS,
 ) -> list[Move]:
     """The moves from q_home to q_rail, or the other way with `back`, that touch nothing.
 
     A straight joint move if it is clear; else one that stops at a point lifted off the rail along the wire; else a way that a
     random search finds.
 
+    Args:
+        tries: of that search.
     Raises:
         LostPathError: neither is clear; `data`: s, reason.
     """
@@ -56,7 +59,7 @@ def air_moves(
         touch = touch or found
     if (
         blocked is not None
-        and (corners := roam(*((q_rail, q_home) if back else (q_home, q_rail)), blocked, tries=ROAMS)) is not None
+        and (corners := roam(*((q_rail, q_home) if back else (q_home, q_rail)), blocked, tries=tries)) is not None
     ):
         return [air_move(a, b, s, config, arm) for a, b in pairwise(corners)]
     ends = np.stack((q_rail, q_home) if back else (q_home, q_rail))

@@ -203,7 +203,7 @@ def _first_that_holds(
             lost.append(error)
             banned |= near(rungs, hold, float(str(error.data["s"])), reach=1 + attempt)
     if not lost:
-        raise refused(rail, rungs, arm, config)
+        raise refused(rail, rungs, arm, config, blocked)
     furthest = max(lost, key=lambda error: float(str(error.data["s"])))
     s, reason = float(str(furthest.data["s"])), str(furthest.data["reason"])
     if reason == "out of reach":

@@ -1,5 +1,7 @@
 """Why a weld cannot be held: the place, the reason, and what to do, as errors."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from weldsim.arm import Arm
@@ -9,16 +11,19 @@ from weldsim.kinematics import D1, JOINT_LIMIT, JOINT_NAMES, REACH
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.ladder import break_at, cuts, least_blocked, wound_up
 from weldsim.motion.rail import Rail
-from weldsim.motion.rungs import Rungs, turned
+from weldsim.motion.rungs import Rungs, make_rungs, turned
+from weldsim.motion.sweep import Blocked
 
+FINE = 0.001  # [m] to which the place is found where every sweep breaks
 CLOSE = 0.0005  # [m] to which the first unreachable place is found
 
 
-def refused(rail: Rail, rungs: Rungs, arm: Arm, config: MotionConfig) -> MotionError:
+def refused(rail: Rail, rungs: Rungs, arm: Arm, config: MotionConfig, blocked: Blocked | None = None) -> MotionError:
     """The error that says why there is no climb over the rungs; `data`: index, s, reason, why, and split where a cut would help."""
     first = rungs.first_refused
     if first is None:
-        return _broken(rail, rungs, JOINT_LIMIT - config.limit_margin)
+        between = break_at(rungs, JOINT_LIMIT - config.limit_margin)
+        return _broken(rail, rungs, JOINT_LIMIT - config.limit_margin, _closer(rail, rungs, arm, config, blocked, between))
     refusal, s = rungs.refusals[first], float(rungs.s[first])
     if refusal is not None and refusal.why == "unreachable":
         return unreachable(rail, _first_unreachable(rail, float(rungs.s[max(first - 1, 0)]), s, arm, config))
@@ -42,9 +47,29 @@ def refused(rail: Rail, rungs: Rungs, arm: Arm, config: MotionConfig) -> MotionE
     )
 
 
-def _broken(rail: Rail, rungs: Rungs, limit: float) -> MotionError:
-    """Every place has a posture, but no continuous motion joins them all; `data`: split, cuts between which motions do [m]."""
-    last, after = break_at(rungs, limit)
+def _closer(
+    rail: Rail, rungs: Rungs, arm: Arm, config: MotionConfig, blocked: Blocked | None, between: tuple[float, float]
+) -> tuple[float, float]:
+    """Arc lengths FINE apart [m] between which every sweep breaks; as they were where a closer look gets past both."""
+    last, after = between
+    if after - last <= FINE:
+        return between
+    near = np.linspace(last, after, int(np.ceil((after - last) / FINE)) + 1)
+    at = np.unique(np.concatenate([rungs.s[rungs.s < last - 1e-9], near]))
+    close = make_rungs(rail, arm, replace(config, rolls=len(rungs.rolls)), blocked, at=at)
+    if (first := close.first_refused) is not None:
+        return (float(at[first - 1]), float(at[first])) if first else between
+    found = break_at(close, JOINT_LIMIT - config.limit_margin)
+    return between if found[0] >= after - 1e-9 else found
+
+
+def _broken(rail: Rail, rungs: Rungs, limit: float, between: tuple[float, float]) -> MotionError:
+    """Every place has a posture, but no continuous motion joins them all; `data`: split, cuts between which motions do [m].
+
+    Args:
+        between: arc lengths [m] of the last place that a sweep gets to, and of the next one.
+    """
+    last, after = between
     split = tuple(cuts(rungs, limit, (rail.start, rail.end)) or ())
     told: dict[str, object] = {"reason": "branch flip", "why": "joint jump"}
     without = "without branch flip"

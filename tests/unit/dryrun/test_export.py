@@ -21,6 +21,7 @@ from weldsim.execution.urscript import script_text
 from weldsim.kinematics import torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.scene.config import SceneConfig
+from weldsim.scene.world import HOME
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -62,7 +63,7 @@ def test_an_arms_own_program_takes_its_torch_along_the_path() -> None:
     trial = try_path(path, "seam", empty_cell(OVER).fitted(arm), MotionConfig(return_home=False, approach=0.02))
     assert trial.trajectory is not None
     machine = new_machine(config=ControllerConfig(calibration=calibration))
-    assert machine.upload(script_text(trial.trajectory, arm=arm)), machine.log[-1]
+    assert machine.upload(script_text(trial.trajectory, arm=arm, starts=[HOME])), machine.log[-1]
     tips = []
     while machine.program_name and machine.t < 60.0:
         machine.tick()

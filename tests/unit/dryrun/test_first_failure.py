@@ -1,5 +1,6 @@
 """Where a job first fails is the first place that a degree-by-degree search refuses, and what is named there is what touches."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -73,6 +74,10 @@ def test_a_sweep_that_something_forbids_is_a_collision_with_it() -> None:
     with pytest.raises(MotionError, match=r"no sweep of the arm clear of obstacles .*torch touches (left|right) wall") as caught:
         plan_motion(path, START, CONFIG, blocked=blocked)
     assert caught.value.data["why"] == "collision"
+    # The walls meet at the middle: where it breaks is told to a millimetre.
+    said = re.search(r"at s = ([0-9.]+) mm of the weld .* goes beyond s = ([0-9.]+) mm", str(caught.value))
+    assert said is not None
+    assert [float(value) for value in said.groups()] == pytest.approx([50.0, 50.0], abs=1.1)
 
 
 def test_a_part_that_stands_in_the_arm_is_named_and_moved_away() -> None:

@@ -206,3 +206,30 @@ def test_a_csv_may_be_written_in_other_ways(tmp_path, spelt):
     one, two = read_program(plain).paths[0], read_program(other).paths[0]
     assert np.array_equal(one.X_BT.p, two.X_BT.p)
     assert np.array_equal(one.X_BT.R, two.X_BT.R)
+
+
+def test_rows_that_end_with_a_separator_or_are_poses_are_read(tmp_path) -> None:
+    rows = ["0.0, -0.45, 0.1, 0, 3.14, 0", "0.1, -0.45, 0.1, 0, 3.14, 0"]
+    want = np.array([[0.0, -0.45, 0.1], [0.1, -0.45, 0.1]])
+    for k, pattern in enumerate(("{},", "p[{}]", "[{}]")):
+        file = tmp_path / f"{k}.csv"
+        file.write_text("\n".join(pattern.format(row) for row in rows))
+        assert np.allclose(read_program(file, tool="torch").paths[0].X_BT.p, want)
+
+
+def test_a_program_that_repeats_itself_for_ever_is_read_for_two_rounds(tmp_path) -> None:
+    """PolyScope's own main loop: it never ends."""
+    file = tmp_path / "loop.script"
+    file.write_text(
+        "def prog():\n  movej([-1.57, -1.3, -1.9, -1.5, 1.57, 0])\n  while (True):\n    movel(p[0.05, -0.45, 0.2, 0, 3.14, 0])\n"
+        "    movel(p[-0.05, -0.45, 0.2, 0, 3.14, 0])\n  end\nend\n"
+    )
+    program = read_program(file)
+    assert [motion.line for motion in program.motions] == [2, 4, 5, 4, 5]
+    assert any("two rounds" in note for note in program.notes)
+    # A loop without a motion, and one whose motions differ from round to round, are no such thing.
+    file.write_text("movej([0, 0, 0, 0, 0, 0])\nmovej([0, 0, 0, 0, 0, 1])\nwhile True:\n  sync()\nend\n")
+    with pytest.raises(InputError, match="does not end by itself"):
+        read_program(file)
+    file.write_text("i = 0\nwhile i < 1200:\n  movej([0, 0, 0, 0, 0, i / 1000])\n  i = i + 1\nend\n")
+    assert len(read_program(file).motions) == 1200
