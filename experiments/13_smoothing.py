@@ -170,7 +170,7 @@ def fitted(seen: Scan) -> Row | None:
     x = across(found, known)[inside]
     section = fit.section
     return {
-        "root_lost": seen.depth - section.depth,
+        "root_lost": seen.depth - fit.depth,
         "wider": section.width - seen.width,
         "blur": section.blur,
         "floor": section.floor,

@@ -12,6 +12,7 @@ from weldsim.scene.shapes import Body, Group, Spec, box, mesh_geom, rod
 from weldsim.scene.workpieces.base import ClampPlace, Workpiece
 
 BOLT_PLACES = ((-0.30, 0.33), (0.28, 0.30), (0.05, -0.30), (-0.33, -0.28), (0.34, -0.31), (0.0, 0.36))  # of length and width
+CLAMPS = (0, 2, 4)
 RAISED = 0.040  # [m] a part whose lowest corner is higher than this stands on legs
 LEG = 0.020  # [m] half the width of a leg
 STRAP = 0.012  # [m] thickness of a clamp's strap
@@ -22,10 +23,12 @@ def add_fixture(spec: Spec, base: Body, part: Body, config: FixtureConfig, workp
     """Clamps and bolts in the part's body (frame P), what stands on the table in the base's (frame B).
 
     Raises:
-        SceneError: a clamp that reaches too far over the part or past its edge, bolts on a bent part or too many, or a name to
-            be left out that nothing has.
+        SceneError: a number of clamps that there are no places for, a clamp that reaches too far over the part or past its
+            edge, bolts on a bent part or too many, or a name to be left out that nothing has.
     """
     raised = float(X_BP.points(workpiece.base_corners)[:, 2].min()) > RAISED
+    if config.clamps not in CLAMPS:
+        raise SceneError(f"fixture: clamps = {config.clamps}: must be one of {', '.join(map(str, CLAMPS))}", key="clamps")
     places = workpiece.clamp_places(config.clamps)
     _check_left_out(config, len(places))
     for i, place in enumerate(places):

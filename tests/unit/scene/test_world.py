@@ -208,6 +208,10 @@ def test_bad_scenes_are_refused(tmp_path: Path) -> None:
         build_world(SceneConfig(fixture=FixtureConfig(overlap=0.2)))
     with pytest.raises(SceneError, match="bolts"):
         build_world(SceneConfig(fixture=FixtureConfig(bolts=9)))
+    many = FixtureConfig()
+    object.__setattr__(many, "clamps", 6)  # types are checked here and nowhere else
+    with pytest.raises(SceneError, match="clamps = 6: must be one of 0, 2, 4"):
+        build_world(SceneConfig(fixture=many))
     with pytest.raises(SceneError, match="standoff"):
         build_world(SceneConfig(views=(ViewConfig(standoff=0.0),)))
     with pytest.raises(SceneError, match="no scan view"):

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from tests.clouds import GROOVE, GrooveCloud, d415_depth, groove_cloud
+from tests.clouds import two_grooves as made_two_grooves
 from weldsim.cloud.filters import voxel_grid
 from weldsim.curves import project
 from weldsim.records import KnownSeam, PointCloud, Seam
 from weldsim.seam.config import ProfileConfig, SeamConfig
 from weldsim.seam.find import find_seams
-from weldsim.seam.profile.find import find_seams_profile
+from weldsim.seam.profile.atlas import make_atlas
+from weldsim.seam.profile.find import _search, find_seams_profile
+from weldsim.seam.profile.valley import CoarseLine
 
 CONFIG = ProfileConfig()
 CURVES = ("straight", "arc", "s")
@@ -69,6 +72,18 @@ def test_without_noise_it_is_exact_to_a_few_hundredths(curve, surface) -> None:
     lean = np.einsum("ij,ij->i", seam.normals_B, -truth.bisectors_B[at])
     assert np.quantile(lean, 0.05) > np.cos(np.radians(2.0)), "outward, along the bisector"
     check_record(seam)
+
+
+@pytest.mark.parametrize(("width", "depth"), [(5, 2.5), (6, 2.0), (6, 3.43), (20, 12)])
+def test_a_groove_along_the_image_has_its_width_and_depth(width: float, depth: float) -> None:
+    """Without noise each column of pixels lies at one place across the groove, whatever the station."""
+    made = groove_cloud(
+        np.random.default_rng(0), width=width * 1e-3, depth=depth * 1e-3, camera_tilt=0.0, standoff=0.38, table=False
+    )
+    seam, truth = only_seam(made)
+    assert error(seam, truth).p95 < 0.1e-3
+    assert seam.width == pytest.approx(width * 1e-3, abs=1.5e-4)
+    assert seam.depth == pytest.approx(depth * 1e-3, abs=1.0e-4)
 
 
 @pytest.mark.parametrize("width", [6, 8, 10, 14, 19, 25])
@@ -173,6 +188,19 @@ def test_two_grooves_are_both_returned_best_first(seed: int) -> None:
         assert np.quantile(near, 0.95) < 0.012, "each region goes with its seam"
     assert sorted(matched) == [0, 1]
     assert found.seams[0].confidence >= found.seams[1].confidence - 0.011
+
+
+def test_what_a_coarse_line_has_beside_a_groove_found_before_is_not_lost() -> None:
+    """The second line runs along the first groove for 110 mm, then over to the other one for 80 mm."""
+    cloud = made_two_grooves()
+    x, up = np.linspace(-0.135, 0.135, 271), np.array([0.0, 0.0, 1.0])
+    first = np.stack([x, np.full(271, -0.45), np.full(271, 0.02)], axis=1)
+    other = np.stack([x[95:175], np.full(80, -0.55), np.full(80, 0.02)], axis=1)
+    second = np.concatenate([first[60:170], other[::-1]])
+    lines = [CoarseLine(line, np.tile(up, (len(line), 1)), 1.0, 1.0) for line in (first, second)]
+    pieces, _ = _search(make_atlas(cloud), lines, CONFIG)
+    middles = sorted(float(np.median(piece.fit.rail.points[:, 1])) for piece in pieces)
+    np.testing.assert_allclose(middles, [-0.55, -0.45], atol=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -7,6 +7,7 @@ import pytest
 
 from weldsim.seam.profile.lean import first_section, section_at_blur, settled_section
 from weldsim.seam.profile.section import Section
+from weldsim.seam.profile.shape import section_of, twin, unknowns
 from weldsim.seam.profile.views import Blocks
 
 X = np.arange(-0.030, 0.030, 0.0005) + 0.00025
@@ -27,7 +28,7 @@ def fine_area(shape: Section, shear: float) -> float:
 
 def blocks_of(truth: Section, shear: np.ndarray, noise: float, rng: np.random.Generator) -> Blocks:
     depth = truth.image(X, shear)[0] + rng.normal(0.0, noise, (len(shear), len(X)))
-    return Blocks(X, depth, np.full(depth.shape, 8.0), shear, 8)
+    return Blocks(X, np.tile(X, (len(shear), 1)), depth, np.full(depth.shape, 8.0), shear, 8)
 
 
 @pytest.mark.parametrize("shear", [0.0, 0.2, -0.45])
@@ -163,3 +164,34 @@ def test_at_the_right_blur_a_groove_taken_for_a_narrower_deeper_one_gets_its_siz
     assert found.blur == truth.blur
     assert found.width == pytest.approx(truth.width, rel=0.05)
     assert abs(found.depth / truth.depth - 1) < 0.15, "a floor makes up for some of it"
+
+
+@pytest.mark.parametrize("place", [-2.2e-4, 1.6e-4])
+def test_cells_that_are_seen_at_one_place_off_their_middle_give_the_width_and_the_line(place: float) -> None:
+    """As along a groove that runs with the image's columns: on a wall, that is another depth than the cell's middle has."""
+    truth = section(width=0.006, depth=0.0034, middle=2e-4, blur=0.0)
+    at, shear = np.tile(X + place, (24, 1)), np.zeros(24)
+    blocks = Blocks(X, at, truth.image(X + place, shear)[0], np.full(at.shape, 8.0), shear, 8)
+    found, _ = settled_section(blocks, first_section(blocks, section(width=0.008, depth=0.0025), 1e-6), 1e-6)
+    assert found.middle == pytest.approx(truth.middle, abs=2e-5)
+    assert found.width == pytest.approx(truth.width, abs=1e-4)
+    assert found.depth == pytest.approx(truth.depth, abs=1e-4)
+
+
+def test_a_shallow_groove_seen_without_noise_is_not_deepened_by_what_is_usual() -> None:
+    truth = section(width=0.006, depth=0.0018, blur=0.0)
+    blocks = blocks_of(truth, np.zeros(24), 1e-6, np.random.default_rng(0))
+    found, _ = settled_section(blocks, first_section(blocks, section(width=0.006, depth=0.0015), 1e-6), 1e-6)
+    assert found.width == pytest.approx(truth.width, abs=2e-4)
+    assert found.depth == pytest.approx(truth.depth, abs=1e-4)
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.4])
+def test_walls_and_blur_may_be_exchanged_and_the_likelier_section_is_taken(floor: float) -> None:
+    truth = section(width=0.010, depth=0.005, floor=floor, blur=4e-4, taper=0.05)
+    other = section_of(twin(unknowns(truth)), 0.0)
+    np.testing.assert_allclose(seen_at(other, X, 0.0), seen_at(truth, X, 0.0), atol=1.5e-4)
+    assert other.blur > 0.0025
+    found, _ = settled_section(blocks_of(truth, np.zeros(24), 1e-5, np.random.default_rng(1)), other, 1e-6)
+    assert found.width == pytest.approx(truth.width, abs=2e-4)
+    assert found.blur < 0.001

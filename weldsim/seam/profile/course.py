@@ -98,7 +98,7 @@ def to_seam(course: Course, sure: float) -> Seam:
     n = unit(course.normals - np.einsum("ij,ij->i", course.normals, t)[:, None] * t)
     lip = 0.5 * (course.width[:, None] * np.cross(n, t) + course.step[:, None] * n)
     share = np.array([piece.span[1] - piece.span[0] for piece in course.pieces])
-    sections = np.array([(piece.fit.section.width, piece.fit.section.depth, piece.fit.parent.noise) for piece in course.pieces])
+    sections = np.array([(piece.fit.section.width, piece.fit.depth, piece.fit.parent.noise) for piece in course.pieces])
     width, depth, noise = (share @ sections / share.sum()).tolist()
     return Seam(
         points_B=points,

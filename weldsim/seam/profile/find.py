@@ -57,7 +57,8 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
 def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tuple[list[Piece], list[Rejection]]:
     """Seams along coarse lines, those in pieces joined, and what was refused.
 
-    What a seam leaves uncovered of its coarse line is tried again as a line of its own, MOST_REMAINDERS times at most.
+    What a seam leaves uncovered of its coarse line, or of one that lies along it for the most part, is tried again as a line
+    of its own, MOST_REMAINDERS times at most.
     """
     found: list[Piece] = []
     rejected: list[Rejection] = []
@@ -69,6 +70,8 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
             rejected.append(_rejection(line, f"surface at one level on both sides over only {level:.0%} of it"))
             continue
         if any(_covers(piece, line) for piece in found):
+            if more > 0:
+                waiting += [(line[run], normals[run], level, more - 1) for run in _own_runs(line, found, 0.8 * config.min_length)]
             continue
         own = _own_part(line, found)
         if arc_length(line[own])[-1] >= 0.8 * config.min_length:
@@ -129,11 +132,23 @@ def _covers(piece: Piece, line: Float[ndarray, "k 3"]) -> bool:
 
 def _own_part(line: Float[ndarray, "k 3"], found: list[Piece]) -> slice:
     """A coarse line without the ends that lie along grooves already found: at a junction it may have run on into another."""
+    at = np.flatnonzero(_own(line, found))
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) > 1 else slice(0, 1)
+
+
+def _own_runs(line: Float[ndarray, "k 3"], found: list[Piece], shortest: float) -> list[slice]:
+    """The stretches of a coarse line at least `shortest` [m] long that lie along no groove already found."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], _own(line, found).astype(np.int8), [0]])))
+    runs = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [run for run in runs if arc_length(line[run])[-1] >= shortest]
+
+
+def _own(line: Float[ndarray, "k 3"], found: list[Piece]) -> Bool[ndarray, "k"]:
+    """Which points of a coarse line lie along no groove already found."""
     own = np.ones(len(line), bool)
     for piece in found:
         own &= _distance(piece, line) >= 0.6 * piece.fit.section.width
-    at = np.flatnonzero(own)
-    return slice(int(at[0]), int(at[-1]) + 1) if len(at) > 1 else slice(0, 1)
+    return own
 
 
 def _distance(piece: Piece, line: Float[ndarray, "k 3"]) -> Float[ndarray, "k"]:

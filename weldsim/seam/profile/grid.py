@@ -1,6 +1,6 @@
 """A strip averaged into cells of station by lateral position: the straightened picture of a groove."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -21,24 +21,34 @@ class Grid:
     """Attributes:
     x: (w,) lateral centre of each column [m].
     depth: (m, w) mean apparent depth below the parent surface [m], NaN where empty.
+    at: (m, w) mean lateral place of the points in each cell [m], its centre where empty. Along a groove that runs with the
+        image's rows or columns they lie at one and the same place in each column's cells: on a wall, that is another depth
+        than the centre's, and no number of stations evens it out.
     count: (m, w) points in each cell.
     shear: (m,) lateral drift of the sight line for each metre inward.
     sight: (m, 3) mean direction of the sight lines, in the cloud's frame; straight down where the viewpoint is unknown.
     step: between stations [m].
+    above: height of the viewpoint over the parent surface [m]; infinity where unknown.
     """
 
     x: Float[ndarray, "w"]
     depth: Float[ndarray, "m w"]
+    at: Float[ndarray, "m w"]
     count: Float[ndarray, "m w"]
     shear: Float[ndarray, "m"]
     sight: Float[ndarray, "m 3"]
     step: float
+    above: float
 
     @property
     def sparsity(self) -> float:
         """How many times as many stations must be looked at together as in a dense cloud to hold as many points, 1 to WIDEST."""
         share = float(np.quantile(np.isfinite(self.depth).mean(axis=1), 0.6))
         return float(np.clip(DENSE / max(share, 1e-6), 1.0, WIDEST))
+
+    def centred(self) -> "Grid":
+        """The same with every cell taken to be seen at its middle."""
+        return replace(self, at=np.tile(self.x, (len(self.depth), 1)))
 
     def filled(self) -> Float[ndarray, "m w"]:
         """Depths with empty cells taken from the stations around, where the cloud is sparse, then from their neighbours
@@ -82,12 +92,15 @@ def make_grid(rail: Rail, strip: Strip, parent: Parent, half: float) -> Grid:
     count = np.bincount(index, minlength=m * width).astype(float)
     total = np.bincount(index, weights=depth[inside], minlength=m * width)
     mean = np.divide(total, count, out=np.full(m * width, np.nan), where=count > 0)
+    centres = (np.arange(width) + 0.5) * DX - half
+    at = np.bincount(index, weights=x[inside] - centres[column[inside]], minlength=m * width) / np.maximum(count, 1)
+    at = at.reshape(m, width) + centres
     near = np.abs(strip.x) < half
     number = np.bincount(strip.station[near], minlength=m)
     drift = np.stack([np.bincount(strip.station[near], weights=strip.slope[near, k], minlength=m) for k in (0, 1)], axis=1)
     known = number > 0
-    at = np.arange(m, dtype=float)
-    drift = interpolate(at[known], drift[known] / number[known, None], at) if known.any() else np.zeros((m, 2))
+    above = float(np.median(strip.above[near])) if near.any() else float("inf")
+    every = np.arange(m, dtype=float)
+    drift = interpolate(every[known], drift[known] / number[known, None], every) if known.any() else np.zeros((m, 2))
     sight = drift[:, :1] * rail.t + drift[:, 1:] * rail.e - rail.n
-    centres = (np.arange(width) + 0.5) * DX - half
-    return Grid(centres, mean.reshape(m, width), count.reshape(m, width), drift[:, 1], sight, rail.step)
+    return Grid(centres, mean.reshape(m, width), at, count.reshape(m, width), drift[:, 1], sight, rail.step, above)

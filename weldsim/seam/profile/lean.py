@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.seam.profile.section import Section
-from weldsim.seam.profile.shape import BLUR, HIGH, LEAN, LOW, UNIT, Solution, predict, section_of, solve, terms, unknowns
+from weldsim.seam.profile.shape import BLUR, HIGH, LEAN, LOW, UNIT, Solution, predict, section_of, solve, terms, twin, unknowns
 from weldsim.seam.profile.views import Blocks, Views, gather
 
 LEANS = (-1.0, -0.7, -0.4, -0.15, 0.15, 0.4, 0.7, 1.0)  # of the most that leaves no wall overhanging
@@ -24,6 +24,7 @@ STOCKY, FLOORS = (0.8, 1.0, 1.3), (0.05, 0.5)  # how much wider and less deep, a
 # A stereo matcher follows the wall that faces it rather than the other one: the reference camera shows the bottom of a
 # symmetric V displaced twice as far as the sight lines do that.
 SLANT = 1.5  # of that displacement, within which a lean the same way has to stand out by
+TWIN_GAIN = 3.0  # log likelihood
 SLANT_SCORE = 9.0  # standard deviations; until then it counts in the doubt
 SYMMETRIC_ODDS = 5.0  # how much likelier a groove is symmetric than leaning, for the doubt: it weighs leans that go unseen
 UNNOTICED = 0.02  # of the width: the lean of a groove that counts as symmetric
@@ -38,7 +39,7 @@ def follow_section(blocks: Blocks, start: Section, noise: float) -> Section:
         noise: the least standard deviation of a cell [m].
     """
     views = gather(blocks, start.depth, noise)
-    return section_of(solve(unknowns(start)[None], _all_but_lean(), views, blocks.x, start.step)[0].theta, start.step)
+    return section_of(solve(unknowns(start)[None], _all_but_lean(), views, start.step)[0].theta, start.step)
 
 
 def first_section(blocks: Blocks, start: Section, noise: float) -> Section:
@@ -46,9 +47,9 @@ def first_section(blocks: Blocks, start: Section, noise: float) -> Section:
     views, base = gather(blocks, start.depth, noise), unknowns(start)
     starts = [_leaning(base, lean, *other) for lean in FIRST_LEANS for other in FIRST_STARTS]
     rough = _calm(np.array(starts), views, blocks, start.step)
-    found = solve(_picked(rough, len(FIRST_STARTS), 2), _all_but_lean(), views, blocks.x, start.step)
+    found = solve(_picked(rough, len(FIRST_STARTS), 2), _all_but_lean(), views, start.step)
     symmetric, leaning = (min(part, key=lambda each: each.cost) for part in (found[:2], found[2:]))
-    free = solve(leaning.theta[None], np.ones(7, bool), views, blocks.x, start.step)[0]
+    free = solve(leaning.theta[None], np.ones(7, bool), views, start.step)[0]
     insists = _insists(_gain(symmetric, free, views, blocks, start.step), free, blocks)
     return section_of((free if insists else symmetric).theta, start.step)
 
@@ -63,7 +64,7 @@ def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Secti
     chosen = float(mass @ lean) if insists else 0.0
     theta = found[int(np.argmin(np.abs(lean - chosen)))].theta.copy()
     theta[LEAN] = chosen
-    last = solve(theta[None], _all_but_lean(), views, blocks.x, start.step)[0]
+    last = _either(theta, views, start.step)
     between = float(mass @ (middle - last.theta[0]) ** 2)
     exchange = abs(float(np.polyfit(lean, middle, 1)[0]))
     unnoticed = float(mass[lean == 0.0].sum()) * (2 * UNNOTICED * exchange) ** 2
@@ -86,7 +87,15 @@ def section_at_blur(blocks: Blocks, start: Section, noise: float, blur: float) -
     starts[:, 3] = np.tile(FLOORS, len(STOCKY))
     free = _all_but_lean()
     free[BLUR] = False
-    return section_of(min(solve(starts, free, views, blocks.x, start.step), key=lambda each: each.cost).theta, start.step)
+    return section_of(min(solve(starts, free, views, start.step), key=lambda each: each.cost).theta, start.step)
+
+
+def _either(theta: Float[ndarray, "7"], views: Views, step: float) -> Solution:
+    """The best section near a start; or, of a symmetric one, near its twin where data without noise say that it is clearly
+    likelier: under noise little but the priors is between the two."""
+    starts = np.stack([theta, twin(theta)]) if views.quiet and theta[LEAN] == 0 else theta[None]
+    found = solve(starts, _all_but_lean(), views, step)
+    return found[-1] if found[-1].cost < found[0].cost - TWIN_GAIN else found[0]
 
 
 def _all_but_lean() -> Bool[ndarray, "7"]:
@@ -106,7 +115,7 @@ def _leaning(base: Float[ndarray, "7"], lean: float, blur: float, floor: float) 
 def _calm(starts: Float[ndarray, "s 7"], views: Views, blocks: Blocks, step: float) -> list[Solution]:
     """Solutions with cells taken as independent: what hangs together makes the cost rugged far from its minimum."""
     plain = replace(views, weight=views.weight * 0.1, white=np.eye(len(blocks.x)))
-    return solve(starts, _all_but_lean(), plain, blocks.x, step, most=10)
+    return solve(starts, _all_but_lean(), plain, step, most=10)
 
 
 def _picked(found: list[Solution], group: int, best: int) -> Float[ndarray, "s 7"]:
@@ -121,7 +130,7 @@ def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: f
     And whether the data insist on a lean.
     """
     found = _at_leans(base, FEW_LEANS, views, blocks, step)
-    symmetric = found[0]
+    symmetric = found[0] = _either(found[0].theta, views, step)
     free = _freed(found, views, blocks, step)
     gain = _gain(symmetric, free, views, blocks, step)
     if gain > WORTH_A_LOOK:
@@ -144,14 +153,14 @@ def _freed(found: list[Solution], views: Views, blocks: Blocks, step: float) -> 
     """The best section of any lean near one of some solutions."""
     near = np.stack([found[0].theta, *(each.theta for each in found)])
     near[:2, LEAN] += (0.08, -0.08)
-    return min(solve(near, np.ones(7, bool), views, blocks.x, step), key=lambda each: each.cost)
+    return min(solve(near, np.ones(7, bool), views, step), key=lambda each: each.cost)
 
 
 def _at_leans(base: Float[ndarray, "7"], leans: tuple[float, ...], views: Views, blocks: Blocks, step: float) -> list[Solution]:
     """The best section for each of some leans."""
     others = ((base[5], base[3]), (max(base[5] - 0.003, 4e-4), 0.1), (base[5] + 0.002, 0.3))
     starts = [_leaning(base, lean, *other) for lean in leans for other in others]
-    return solve(_picked(_calm(np.array(starts), views, blocks, step), len(others), 1), _all_but_lean(), views, blocks.x, step)
+    return solve(_picked(_calm(np.array(starts), views, blocks, step), len(others), 1), _all_but_lean(), views, step)
 
 
 def _gain(symmetric: Solution, free: Solution, views: Views, blocks: Blocks, step: float) -> float:
@@ -193,7 +202,7 @@ def _excess(one: Solution, best: Solution, views: Views, blocks: Blocks, step: f
     """
     if one is best:
         return 1.0
-    depth, _ = predict(np.stack([one.theta, best.theta]), step, blocks.x, views.shear)
+    depth, _ = predict(np.stack([one.theta, best.theta]), step, views.at, views.shear)
     apart = ((depth[1] - depth[0]) * np.sqrt(views.weight)) @ views.white.T
     votes = _scores((depth[1] - depth[0])[None], depth[1], views, blocks)[0]
     n = len(votes)
@@ -204,10 +213,10 @@ def _excess(one: Solution, best: Solution, views: Views, blocks: Blocks, step: f
 
 def _variance(found: Solution, views: Views, blocks: Blocks, step: float) -> float:
     """Variance of a solution's middle [m^2] at its lean, from the scatter of its scores, clustered as in `_excess`."""
-    depth, jacobian = predict(found.theta[None], step, blocks.x, views.shear)
+    depth, jacobian = predict(found.theta[None], step, views.at, views.shear)
     free = found.free & (found.theta > LOW) & (found.theta < HIGH)
     free[:3] = True
-    slopes = terms(found.theta[None], views, blocks.x, step)[1][0][free]
+    slopes = terms(found.theta[None], views, step)[1][0][free]
     inverse = np.linalg.pinv(slopes @ slopes.T + 1e-9 * np.eye(len(slopes)), rcond=1e-10, hermitian=True)
     score = np.einsum("p,pbn->bn", inverse[0], _scores(jacobian[0][free], depth[0], views, blocks))
     n, p = len(score), len(slopes)

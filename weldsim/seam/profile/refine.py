@@ -18,7 +18,7 @@ from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
 from weldsim.seam.profile.strength import Choice
 from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
-from weldsim.seam.profile.views import Blocks
+from weldsim.seam.profile.views import Blocks, agree
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
 BLOCK = 8  # stations averaged together for the cross-section fit
@@ -28,7 +28,6 @@ MOST_TURNS = 6
 LEVELLING = 2  # turns in which the rail, seen upright at first, is stood on the parent surface
 STEEP = 0.9  # [rad] that the two sides may differ before that
 OTHER_VIEW = 0.08  # [rad] by which the sight turns from one block to the next only from view to view
-QUIETEST = 2e-4  # [m] least standard deviation of a cell: on a wall it depends on where in the cell its points lie
 WIDEST_FOOTPRINT = 1.2  # of the camera's window on a surface seen at 35 deg, over one that faces it
 SETTLED = 2e-4  # [m] a rail that moves less than this is done
 BRIDGE = 0.010  # [m] a groove goes on across this without being seen
@@ -57,6 +56,11 @@ class Fit:
     inner: float
     sigma: Float[ndarray, "m"]
     bridge: float = BRIDGE
+
+    @property
+    def depth(self) -> float:
+        """Of the bottom below the opening [m]: the section's is in inverse depth, which the viewpoint's height turns back."""
+        return self.section.depth / (1.0 - self.section.depth / self.grid.above)
 
     @property
     def core(self) -> slice:
@@ -191,6 +195,10 @@ def _measure(
     grid = make_grid(rail, strip, parent, 0.5 * start.width + blur + 0.006)
     start = replace(start, step=parent.hilo)
     flanked = sided(parent, config)
+    blocks = mean_blocks(grid, flanked, start)
+    if blocks is None or not agree(blocks, start.depth):
+        # A camera's noise outweighs where its points lie in the cells; only without it do cells' places tell walls from blur.
+        grid = grid.centred()
     section, doubt = _fit_grid(grid, flanked, parent.noise, start, stage)
     track = follow(grid, section, flanked, attached(parent))
     section = replace(section, middle=0.0)
@@ -309,14 +317,17 @@ def _from_one_place(sight: Float[ndarray, "b 3"], candidates: Bool[ndarray, "b"]
 
 
 def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, float]:
-    """The section fitted to blocks of stations, and its middle's standard deviation [m]."""
+    """The section fitted to blocks of stations, and its middle's standard deviation [m].
+
+    Args:
+        noise: the least standard deviation of a cell [m]: that of the plate.
+    """
     blocks = mean_blocks(grid, flanked, start)
     if blocks is None:
         return start, 0.0
-    least = max(noise, QUIETEST)
     if stage == "settled":
-        return settled_section(blocks, start, least)
-    return (first_section if stage == "first" else follow_section)(blocks, start, least), 0.0
+        return settled_section(blocks, start, noise)
+    return (first_section if stage == "first" else follow_section)(blocks, start, noise), 0.0
 
 
 def mean_blocks(grid: Grid, flanked: Bool[ndarray, "m"], start: Section) -> Blocks | None:
@@ -330,6 +341,7 @@ def mean_blocks(grid: Grid, flanked: Bool[ndarray, "m"], start: Section) -> Bloc
     known = np.isfinite(use)
     number = known.sum(axis=1)
     mean = np.where(known, use, 0.0).sum(axis=1) / np.maximum(number, 1)
+    off = np.where(known, grid.at[: m * BLOCK].reshape(m, BLOCK, -1) - grid.x, 0.0).sum(axis=1) / np.maximum(number, 1)
     shear = grid.shear[: m * BLOCK].reshape(m, BLOCK).mean(axis=1)
     # Only blocks that hold a groove of about the usual depth shape the section: ends and gaps would blunt it.
     inside = np.abs(grid.x) < 0.25 * start.width
@@ -342,4 +354,4 @@ def mean_blocks(grid: Grid, flanked: Bool[ndarray, "m"], start: Section) -> Bloc
     keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
     if not keep.any() or np.count_nonzero(number[keep]) < FEWEST_CELLS:
         return None
-    return Blocks(grid.x, mean[keep], number[keep].astype(float), shear[keep], BLOCK)
+    return Blocks(grid.x, grid.x + off[keep], mean[keep], number[keep].astype(float), shear[keep], BLOCK)

@@ -43,10 +43,27 @@ def section_of(theta: Float[ndarray, "7"], step: float) -> Section:
     return Section(middle=middle, width=width, depth=depth, floor=floor, lean=lean * most, blur=blur, taper=taper, step=step)
 
 
+def twin(theta: Float[ndarray, "*s 7"]) -> Float[ndarray, "*s 7"]:
+    """Unknowns of another section that looks much the same: its walls reach as far sideways as this one's blur, and its
+    blur as far as this one's walls.
+
+    A wall is a step averaged over its own reach, and the blur averages it once more: in which order is not to be seen.
+    So a V without blur is a square slot of half its width under a window of that width. Between the two only priors decide.
+    """
+    width, floor, blur = (theta[..., k] for k in (1, 3, BLUR))
+    reach = (1 - floor) * width / 2
+    middle = width - reach  # between the walls, half way down
+    other = theta.copy()
+    other[..., 1] = middle + blur
+    other[..., 3] = np.maximum(middle - blur, 0.0) / other[..., 1]
+    other[..., BLUR] = reach
+    return np.clip(other, LOW, HIGH)
+
+
 def predict(
-    theta: Float[ndarray, "s 7"], step: float, x: Float[ndarray, "w"], shear: Float[ndarray, "g"]
+    theta: Float[ndarray, "s 7"], step: float, x: Float[ndarray, "g w"], shear: Float[ndarray, "g"]
 ) -> tuple[Float[ndarray, "s g w"], Float[ndarray, "s 7 g w"]]:
-    """Depths [m] and their Jacobian in UNITs.
+    """Depths [m] at lateral places x [m] under each shear, and their Jacobian in UNITs.
 
     Blurring is linear, so only the corners are differentiated by differences; what follows from them is exact.
     """
@@ -56,7 +73,7 @@ def predict(
     kinks = turns(v, d)
     v, kinks = v.reshape(BLUR + 1, s, *v.shape[1:]), kinks.reshape(BLUR + 1, s, *kinks.shape[1:])
     stretch = footprint(shear)
-    ramp, slope, widening, tapering = ramps(v[0][..., None] - x, theta[:, BLUR, None] * stretch, theta[:, TAPER])
+    ramp, slope, widening, tapering = ramps(v[0][..., None] - x[:, None], theta[:, BLUR, None] * stretch, theta[:, TAPER])
     # For each corner: its turn, how that changes with the unknowns, and its turn times how it moves.
     turn, changed = kinks[0], (kinks[1:] - kinks[0]) / DELTA
     moved = turn * (v[1:] - v[0]) / DELTA
@@ -79,11 +96,9 @@ def _corners(theta: Float[ndarray, "s 7"], step: float) -> Float[ndarray, "s 6"]
     return np.stack([middle, width, depth, floor, lean * (1 - floor) * width / 2, np.full_like(middle, step)], axis=1)
 
 
-def terms(
-    theta: Float[ndarray, "s 7"], views: Views, x: Float[ndarray, "w"], step: float
-) -> tuple[Float[ndarray, "s k"], Float[ndarray, "s 7 k"]]:
+def terms(theta: Float[ndarray, "s 7"], views: Views, step: float) -> tuple[Float[ndarray, "s k"], Float[ndarray, "s 7 k"]]:
     """Whitened residuals and their Jacobian in UNITs, those of the priors last."""
-    depth, jacobian = predict(theta, step, x, views.shear)
+    depth, jacobian = predict(theta, step, views.at, views.shear)
     root, s = np.sqrt(views.weight), len(theta)
     data = (((depth - views.depth) * root) @ views.white.T).reshape(s, -1)
     slopes = ((jacobian * root) @ views.white.T).reshape(s, 7, -1)
@@ -97,13 +112,11 @@ def terms(
     return np.concatenate([data, prior], axis=1), np.concatenate([slopes, steep], axis=2)
 
 
-def solve(
-    theta: Float[ndarray, "s 7"], free: Bool[ndarray, "7"], views: Views, x: Float[ndarray, "w"], step: float, most: int = 15
-) -> list[Solution]:
+def solve(theta: Float[ndarray, "s 7"], free: Bool[ndarray, "7"], views: Views, step: float, most: int = 15) -> list[Solution]:
     """The best section near each start, by Levenberg and Marquardt's method within LOW and HIGH, all starts at once."""
     theta = np.clip(theta, LOW, HIGH)
     damping = np.full(len(theta), 1e-2)
-    residual, jacobian = terms(theta, views, x, step)
+    residual, jacobian = terms(theta, views, step)
     cost = 0.5 * (residual**2).sum(axis=1)
     for _ in range(most):
         gram = jacobian @ jacobian.transpose(0, 2, 1)
@@ -114,7 +127,7 @@ def solve(
         system = gram + np.where(held, 1.0, damping[:, None] * scale + 1e-9)[:, :, None] * np.eye(7)
         move = np.linalg.solve(system, np.where(held, 0.0, -gradient)[..., None])[..., 0]
         trial = np.clip(theta + move * UNIT, LOW, HIGH)
-        new_residual, new_jacobian = terms(trial, views, x, step)
+        new_residual, new_jacobian = terms(trial, views, step)
         new_cost = 0.5 * (new_residual**2).sum(axis=1)
         better = new_cost < cost
         gain = np.where(better, cost - new_cost, 0.0)

@@ -60,6 +60,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
             that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
     """
     model, slope = section.image(grid.x, grid.shear)
+    model -= slope * (grid.at - grid.x)  # depth falls to the left by as much as it grows when the section moves there
     # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
     with np.errstate(invalid="ignore"):
         known = (grid.depth < deepest(section)) & (grid.depth > -0.004)

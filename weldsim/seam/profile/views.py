@@ -12,6 +12,7 @@ FEWEST_BLOCKS = 4  # in a view: a median of fewer is no robust one
 REACHES = (0.001, 0.002, 0.003, 0.004, 0.0055, 0.0075)  # [m] correlation lengths tried for the noise
 SHARPNESS = 2.0  # with which a worse correlation length counts less
 USUAL_REACH = 0.0035  # [m] where there is too little to tell
+QUIETEST = (1e-4, 2e-4)  # [m] least standard deviation of a cell: of blocks that agree to that, and of any others
 WHITE = 0.2  # of the noise's variance, at least, is taken as independent from cell to cell: cells are no exact means
 PARENT = 0.4  # error of the parent surface, level and tilt, over the noise of a cell
 
@@ -21,11 +22,13 @@ class Blocks:
     """Cells of a strip averaged over blocks of stations.
 
     Attributes:
-        x: (w,) [m].  depth: (b, w) apparent [m].  number: (b, w) stations with data in each cell, of `full`; 0 = empty.
+        x: (w,) centre of each column of cells [m].  at: (b, w) mean lateral place of the points in each cell [m].
+        depth: (b, w) apparent [m].  number: (b, w) stations with data in each cell, of `full`; 0 = empty.
         shear: (b,) how far the sight line drifts to the left for each metre inward.
     """
 
     x: Float[ndarray, "w"]
+    at: Float[ndarray, "b w"]
     depth: Float[ndarray, "b w"]
     number: Float[ndarray, "b w"]
     shear: Float[ndarray, "b"]
@@ -38,16 +41,20 @@ class Views:
 
     Attributes:
         shear: (g,).  depth, weight: (g, w) robust mean [m] and inverse variance [1/m^2], 0 where empty.
+        at: (g, w) mean lateral place of the points behind each mean [m].
         of: (b,) view of each block.  each: (b, w) the part of each cell in that weight.
         white: (w, w) maps cells over their deviation to numbers of unit variance that hang together no more.
+        quiet: whether the blocks agree to within QUIETEST.
     """
 
     shear: Float[ndarray, "g"]
+    at: Float[ndarray, "g w"]
     depth: Float[ndarray, "g w"]
     weight: Float[ndarray, "g w"]
     of: Int[ndarray, "b"]
     each: Float[ndarray, "b w"]
     white: Float[ndarray, "w w"]
+    quiet: bool
 
 
 def gather(blocks: Blocks, depth: float, noise: float) -> Views:
@@ -56,6 +63,35 @@ def gather(blocks: Blocks, depth: float, noise: float) -> Views:
     Args:
         depth: of the groove, roughly [m].  noise: the least standard deviation of a cell [m].
     """
+    of, known, middle = _grouped(blocks, depth)
+    seen = np.where(known, blocks.depth, np.nan)
+    off = np.nan_to_num(seen - middle[of])
+    least = _least(off, known)
+    deviation = _deviation(np.where(known, np.abs(off), np.nan), max(noise, least))
+    tame = 1 / np.maximum(np.abs(off) / (2.5 * deviation), 1.0)
+    each = known * blocks.number / blocks.full * tame / deviation**2
+    weight, total, place = (np.zeros_like(middle) for _ in range(3))
+    np.add.at(weight, of, each)
+    np.add.at(total, of, each * np.nan_to_num(seen))
+    np.add.at(place, of, each * (blocks.at - blocks.x))
+    shear = np.bincount(of, weights=blocks.shear) / np.bincount(of)
+    white = np.linalg.inv(np.linalg.cholesky(_correlation(off * tame / deviation, known, blocks.x)))
+    some = np.maximum(weight, 1e-30)
+    return Views(shear, blocks.x + place / some, total / some, weight, of, each, white, least < QUIETEST[1])
+
+
+def agree(blocks: Blocks, depth: float) -> bool:
+    """Whether the blocks show one section to within QUIETEST: an exact sensor's, not a noisy camera's.
+
+    Args:
+        depth: of the groove, roughly [m].
+    """
+    of, known, middle = _grouped(blocks, depth)
+    return _least(np.nan_to_num(np.where(known, blocks.depth, np.nan) - middle[of]), known) < QUIETEST[1]
+
+
+def _grouped(blocks: Blocks, depth: float) -> tuple[Int[ndarray, "b"], Bool[ndarray, "b w"], Float[ndarray, "g w"]]:
+    """View of each block, which cells may show the groove, and each view's median section [m]."""
     count = len(blocks.shear)
     spread = float(np.ptp(blocks.shear))
     groups = int(np.clip(np.ceil(spread * depth / SAME_VIEW), 1, min(MOST_VIEWS, max(count // FEWEST_BLOCKS, 1))))
@@ -64,17 +100,7 @@ def gather(blocks: Blocks, depth: float, noise: float) -> Views:
     # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
     known = (blocks.number > 0) & (blocks.depth < 1.5 * depth + 0.003) & (blocks.depth > -0.004)
     seen = np.where(known, blocks.depth, np.nan)
-    middle = np.stack([_median(seen[of == g]) for g in range(groups)])
-    off = np.nan_to_num(seen - middle[of])
-    deviation = _deviation(np.where(known, np.abs(off), np.nan), noise)
-    tame = 1 / np.maximum(np.abs(off) / (2.5 * deviation), 1.0)
-    each = known * blocks.number / blocks.full * tame / deviation**2
-    weight, total = np.zeros_like(middle), np.zeros_like(middle)
-    np.add.at(weight, of, each)
-    np.add.at(total, of, each * np.nan_to_num(seen))
-    shear = np.bincount(of, weights=blocks.shear) / np.bincount(of)
-    white = np.linalg.inv(np.linalg.cholesky(_correlation(off * tame / deviation, known, blocks.x)))
-    return Views(shear, total / np.maximum(weight, 1e-30), weight, of, each, white)
+    return of, known, np.stack([_median(seen[of == g]) for g in range(groups)])
 
 
 def _median(values: Float[ndarray, "b w"]) -> Float[ndarray, "w"]:
@@ -83,6 +109,14 @@ def _median(values: Float[ndarray, "b w"]) -> Float[ndarray, "w"]:
     last = np.maximum(np.isfinite(values).sum(axis=0) - 1, 0)
     column = np.arange(values.shape[1])
     return 0.5 * (order[last // 2, column] + order[(last + 1) // 2, column])
+
+
+def _least(off: Float[ndarray, "b w"], known: Bool[ndarray, "b w"]) -> float:
+    """The least standard deviation of a cell [m], as the blocks' rms distance from their mean tells: a camera that counts in
+    steps shows plates without noise, but no groove."""
+    if len(off) < FEWEST_BLOCKS:
+        return QUIETEST[1]
+    return float(np.clip(np.sqrt((off * off).sum() / max(np.count_nonzero(known), 1)), *QUIETEST))
 
 
 def _deviation(off: Float[ndarray, "b w"], noise: float) -> Float[ndarray, "w"]:

@@ -14,7 +14,7 @@ from weldsim.frames import unit
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.join import Piece
 from weldsim.seam.profile.lean import section_at_blur
-from weldsim.seam.profile.refine import QUIETEST, Fit, mean_blocks, sided
+from weldsim.seam.profile.refine import Fit, mean_blocks, sided
 
 ODD = 0.15  # of the median blur, from which on a piece's own counts less in the mean
 ALIEN = 0.75  # of the mean; a piece further off has been seen otherwise and keeps its own
@@ -50,7 +50,7 @@ def _at_blur(piece: Piece, blur: float, config: ProfileConfig) -> Piece:
     blocks = mean_blocks(fit.grid, sided(fit.parent, config), fit.section)
     if blocks is None:
         return piece
-    found = section_at_blur(blocks, fit.section, max(fit.parent.noise, QUIETEST), blur)
+    found = section_at_blur(blocks, fit.section, fit.parent.noise, blur)
     return replace(piece, fit=replace(fit, section=replace(found, middle=fit.section.middle)))
 
 
