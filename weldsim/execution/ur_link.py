@@ -70,7 +70,7 @@ def open_link(config: UrConfig, name: str) -> Link:
         client = ClientProcess(client_settings(config, PERIODS[series]), config.answer_timeout)
         client.wait_ready(config.connect_timeout)
         _skip_old(stream, config.connect_timeout)
-        first = _await(stream, lambda sample: _ready(sample, config), config.connect_timeout, "wait for commands with the arc off")
+        first = _first(stream, config)
         for trouble in (_tcp_trouble(config, client.tcp), _payload_trouble(config, first)):
             if trouble is not None:
                 raise refuse(trouble)
@@ -168,10 +168,25 @@ def _meanwhile(config: UrConfig, stream: StateStream | None) -> Trouble | None:
 
 
 def _skip_old(stream: StateStream, seconds: float) -> None:
-    """Nothing, once what was on its way before this call is taken. Raises LinkError."""
-    stream.take_all()
+    """Nothing, once what was on its way before this call is taken. Raises LinkError.
+
+    States carry the moment at which they were read, together with all that had come in by then: where this process was held up
+    that is much later than they were sent, so the first lot that is read after this call is old too.
+    """
+    lot = time.monotonic()
+    for _ in range(2):
+        lot = _await(stream, lambda sample, after=lot: sample.arrived > after, seconds).arrived
     for _ in range(ON_ITS_WAY):
         _await(stream, lambda sample: True, seconds)
+
+
+def _first(stream: StateStream, config: UrConfig) -> Sample:
+    """The first state in which all is ready; a payload that was set may take some of them to be told. Raises LinkError."""
+    end = time.monotonic() + PROOF
+    while True:
+        first = _await(stream, lambda sample: _ready(sample, config), config.connect_timeout, "wait for commands with the arc off")
+        if _payload_trouble(config, first) is None or time.monotonic() > end:
+            return first
 
 
 def _ready(sample: Sample, config: UrConfig) -> bool:

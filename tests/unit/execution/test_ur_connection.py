@@ -5,6 +5,7 @@ import os
 import selectors
 import socket
 import threading
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,6 +18,7 @@ from weldsim.execution.rtde_packet import Packet, PacketReader, PacketType
 from weldsim.execution.rtde_talk import LinkError
 from weldsim.execution.ur_config import UrConfig
 from weldsim.execution.ur_dashboard import Dashboard, switch_off
+from weldsim.execution.ur_link import ON_ITS_WAY, PROOF, _first, _skip_old
 from weldsim.execution.ur_ports import DASHBOARD, RTDE, SECONDARY
 from weldsim.execution.ur_process import ClientError, ClientProcess
 from weldsim.execution.ur_robot import UrRobot
@@ -234,6 +236,48 @@ def sample(**changed: object) -> Sample:
         "safety_status_bits": 1,
     }
     return Sample(**(values | changed))
+
+
+class Lots(StateStream):
+    """A stream of states that come in lots, each read at one moment; a lot is read when it is waited for."""
+
+    def __init__(self, lots: list[list[dict]]) -> None:
+        self.lots: list[list[dict]] = lots
+        self.waiting: list[Sample] = []
+
+    def wait(self, seconds: float) -> bool:
+        if not self.waiting and self.lots:
+            time.sleep(0.002)
+            now = time.monotonic()
+            self.waiting = [sample(arrived=now, **each) for each in self.lots.pop(0)]
+        return bool(self.waiting)
+
+    def take(self) -> Sample:
+        return self.waiting.pop(0)
+
+
+@pytest.mark.parametrize("held_up", [0, 3, 40])
+def test_a_payload_is_not_read_back_from_states_that_were_sent_before_it_was_set(held_up: int) -> None:
+    config = UrConfig()
+    old = [{"timestamp": 0.008 * k, "payload": 0.0, "payload_cog": [0.0] * 3} for k in range(1 + held_up)]
+    new = [[{"timestamp": 1 + 0.008 * k, "payload": config.payload, "payload_cog": list(config.payload_cog)}] for k in range(9)]
+    stream = Lots([old[:1], old[1:], *new] if held_up else [old, *new])
+    assert stream.wait(1.0)  # the first lot has been read before, and nobody has looked at it
+    _skip_old(stream, 1.0)
+    first = _first(stream, config)
+    assert first.payload == config.payload
+    assert 1 <= first.timestamp < 1 + 0.008 * (3 + ON_ITS_WAY)
+
+
+def test_a_payload_may_take_a_moment_and_one_that_never_comes_is_told() -> None:
+    config = UrConfig()
+    late = [[{"payload": 0.0 if k < 5 else config.payload, "payload_cog": list(config.payload_cog)}] for k in range(9)]
+    stream = Lots(late)
+    assert _first(stream, config).payload == config.payload
+    never = Lots([[{"payload": 0.0}]] * 10_000)
+    began = time.monotonic()
+    assert _first(never, config).payload == 0.0
+    assert time.monotonic() - began >= PROOF
 
 
 @pytest.mark.parametrize(
