@@ -14,21 +14,12 @@ from weldsim.controller.state_message import state_message, version_message
 PERIOD = 0.1  # [s]
 
 
-class PrimarySession:
+class PrimarySession(ScriptSession):
     """One client: a script session that is told of the arm."""
 
     def __init__(self, machine: Machine) -> None:
-        self._machine, self._script = machine, ScriptSession(machine)
+        super().__init__(machine)
         self._due, self._told = time.perf_counter() + PERIOD, False
-
-    def greeting(self) -> bytes:
-        return b""
-
-    def ended(self) -> None:
-        self._script.ended()
-
-    def received(self, data: bytes) -> bytes:
-        return self._script.received(data)
 
     def data(self) -> bytes:
         """The message that is due after one more control period, or nothing."""

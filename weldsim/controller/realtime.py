@@ -67,7 +67,7 @@ def realtime_packet(now: Snapshot) -> bytes:
     )
 
 
-class RealtimeSession:
+class RealtimeSession(ScriptSession):
     """One client: a script session that is told of every control period.
 
     Attributes:
@@ -78,17 +78,8 @@ class RealtimeSession:
     send_buffer = 1 << 16
 
     def __init__(self, machine: Machine) -> None:
-        self._machine, self._script = machine, ScriptSession(machine)
+        super().__init__(machine)
         self._since = time.perf_counter() + SILENCE
-
-    def greeting(self) -> bytes:
-        return b""
-
-    def ended(self) -> None:
-        self._script.ended()
-
-    def received(self, data: bytes) -> bytes:
-        return self._script.received(data)
 
     def data(self) -> bytes:
         """The packet of the last control period, or nothing in the first tenth of a second."""

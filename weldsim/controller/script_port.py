@@ -30,7 +30,7 @@ def split_programs(text: str) -> tuple[list[str], str]:
 
 
 class ScriptSession:
-    """One client that sends scripts. It is told nothing here: what it is told is said in `primary` and `realtime`."""
+    """One client that sends scripts; what it is told in turn its subclasses say (`primary`, `realtime`)."""
 
     def __init__(self, machine: Machine) -> None:
         self._machine, self._text = machine, ""
