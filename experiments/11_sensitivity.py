@@ -21,6 +21,8 @@ from weldsim.config import CellConfig, load_toml, structure
 from weldsim.regression import regress
 from weldsim.scene.config import SceneConfig
 from weldsim.scene.files import scene_path
+from weldsim.sensor.d415 import D415_NOISE
+from weldsim.sensor.noise import total_sigma
 
 RESULTS = Path(__file__).parent / "results"
 COLOURS = {"profile": "#12355b", "thesis": "#c4501b"}
@@ -55,7 +57,7 @@ SWEEPS = (
         name="noise",
         label="disparity noise, standard deviation [px]",
         values=(0.02, 0.05, 0.075, 0.10, 0.15, 0.25),
-        config=lambda config, value: replace(config, sensor=replace(config.sensor, disparity_sigma=value)),
+        config=lambda config, value: replace(config, sensor=replace(config.sensor, noise_gain=value / total_sigma(D415_NOISE))),
     ),
     Sweep(
         name="width",

@@ -30,7 +30,9 @@ from weldsim.sensor.d415 import D415Config
 
 RESULTS = Path(__file__).parent / "results"
 DEGREE = math.pi / 180
-QUIET = replace(D415Config(), disparity_sigma=0.0, pixel_locking=0.0, disparity_step=0.0, depth_unit=0.0, edge_jitter=0.0, window=1)
+QUIET = replace(
+    D415Config(), noise_gain=0.0, pixel_locking=0.0, disparity_step=0.0, depth_unit=0.0, edge_jitter=0.0, mixed_pixels=0.0, window=1
+)
 ARM = {"kinematic_position": 0.1e-3, "kinematic_rotation": 0.01 * DEGREE}
 HAND_EYE = {"hand_eye_position": 1e-3, "hand_eye_rotation": 0.1 * DEGREE}
 
@@ -38,10 +40,10 @@ HAND_EYE = {"hand_eye_position": 1e-3, "hand_eye_rotation": 0.1 * DEGREE}
 def sources(seed: int) -> dict[str, tuple[SensorName, CellConfig]]:
     """{source: sensor and config} of one unit."""
     perfect = CellConfig()
-    blurred = replace(D415Config(), disparity_sigma=0.0)
+    blurred = replace(D415Config(), noise_gain=0.0)
     return {
         "none": ("exact", perfect),
-        "sensor noise": ("d415", replace(perfect, sensor=replace(QUIET, disparity_sigma=D415Config().disparity_sigma))),
+        "sensor noise": ("d415", replace(perfect, sensor=replace(QUIET, noise_gain=1.0))),
         "blur, steps, locking": ("d415", replace(perfect, sensor=blurred)),
         "view offset": ("d415", replace(perfect, sensor=replace(QUIET, offset_sigma=3.5e-3))),
         "hand-eye": ("exact", replace(perfect, twin=TwinConfig(**HAND_EYE, seed=seed))),

@@ -1,4 +1,4 @@
-"""What a window matcher does to a disparity image: average over its support, noise, trouble at edges.
+"""What a window matcher does to a disparity image: average over its support, trouble at edges; fields for holes and speckle.
 
 The pieces of the parametric D415 model, each a pure function on arrays. Disparity 0 stands for no surface.
 """
@@ -113,3 +113,41 @@ def hidden_from_right(disparity: Float32[ndarray, "h w"], step: float) -> Bool[n
     # A surface turned towards the right imager leaves columns without a sample: fill gaps of two.
     nearest = cv2.morphologyEx(nearest.reshape(height, width), cv2.MORPH_CLOSE, np.ones((1, 3), np.uint8))
     return outside | (disparity < nearest.reshape(-1)[cell] - step)
+
+
+def left_of(rng: Generator, hidden: Bool[ndarray, "h w"], width: float) -> Int[ndarray, "n"]:
+    """Flat indices of about `width` pixels to the left of each hidden run, a patch of rows alike.
+
+    Runs that begin at the image's border have nothing to their left.
+    """
+    columns = hidden.shape[1]
+    ends = np.flatnonzero(hidden[:, 1:] & ~hidden[:, :-1])
+    ends += ends // (columns - 1)  # of the whole image: the pixel left of the run
+    wide = np.maximum(width + 0.5 * patches(rng, (hidden.shape[0], columns), ends), 0.0)
+    reach = np.arange(int(wide.max(initial=0.0)) + 2)
+    pixels = ends[:, None] - reach
+    lost = (reach + 0.5 < wide[:, None]) & (pixels >= (ends // columns * columns)[:, None])
+    return pixels[lost]
+
+
+def mixed_rims(
+    rng: Generator, disparity: Float32[ndarray, "h w"], seen: Bool[ndarray, "h w"], step: float, share: float
+) -> tuple[Int[ndarray, "n"], Float32[ndarray, "n"]]:
+    """Flat indices of pixels on the nearer side of a step that show neither of its surfaces, and what they show [px].
+
+    At a share of the places where a row or a column crosses a step of at least `step` between two surfaces, any disparity
+    between theirs; places not `seen` are left out.
+    """
+    indices, values = [], []
+    flat, places = disparity.reshape(-1), seen.reshape(-1)
+    for axis, stride in ((1, 1), (0, disparity.shape[1])):
+        first, second = (disparity[:, :-1], disparity[:, 1:]) if axis else (disparity[:-1], disparity[1:])
+        at = np.flatnonzero((np.abs(second - first) >= step) & (np.minimum(first, second) > 0))
+        at += at // (disparity.shape[1] - 1) if axis else 0
+        near = np.where(flat[at] > flat[at + stride], at, at + stride)
+        far = 2 * at + stride - near
+        chosen = (rng.random(len(at)) < share) & places[near]
+        near, far = near[chosen], far[chosen]
+        indices.append(near)
+        values.append(flat[far] + rng.random(len(near), dtype=np.float32) * (flat[near] - flat[far]))
+    return np.concatenate(indices), np.concatenate(values)
