@@ -13,6 +13,7 @@ SEEN = 0.64  # cosine: a surface turned further from a chart's direction than th
 ALIKE = 0.9  # cosine between the normals of one direction
 SHARE = 0.08  # of the patches that a direction must have
 MOST = 5  # further directions
+OPPOSED = -0.35  # cosine to the main direction, under which a surface would be looked at from behind: a ridge is a valley there
 LAYER = 0.025  # [m] below the outermost point of a cell is still the same surface: deeper than a groove
 CELL = 0.003  # [m] of such a cell
 
@@ -39,7 +40,7 @@ def facing_directions(cloud: PointCloud, main: Float[ndarray, "3"]) -> list[Floa
         if np.count_nonzero(alike) < SHARE * len(centres):
             continue
         out = normals[alike] @ axis if signed else (centres[alike] - middle) @ axis
-        found += [way * axis for way in (1.0, -1.0) if np.mean(way * out > 0) > 0.25]
+        found += [way * axis for way in (1.0, -1.0) if np.mean(way * out > 0) > 0.25 and way * float(axis @ main) > OPPOSED]
     return found[:MOST]
 
 

@@ -14,6 +14,7 @@ from weldsim.curves import arc_length, project
 from weldsim.records import PointCloud, Rejection, SeamFindings
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.atlas import Atlas, make_atlas
+from weldsim.seam.profile.background import Standing, standing
 from weldsim.seam.profile.beyond import carry_on
 from weldsim.seam.profile.branches import part_at_branches
 from weldsim.seam.profile.corners import lay_courses
@@ -22,7 +23,7 @@ from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.grow import grow, uncovered
 from weldsim.seam.profile.join import Piece, gaps, join_pieces
-from weldsim.seam.profile.judge import confidence, refusal
+from weldsim.seam.profile.judge import confidence, doubt, refusal
 from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit
 from weldsim.seam.profile.track import deepest
@@ -44,7 +45,14 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     atlas = make_atlas(cloud)
     lines, threshold = atlas.coarse_lines(config, threshold_factor)
     accepted, rejected = _search(atlas, lines, config)
-    found = [(course, _confidence(course, config)) for course in lay_courses(accepted, config)]
+    stands = {id(piece): stand for piece in accepted if (stand := _standing(piece, atlas)) is not None}
+    found: list[tuple[Course, float]] = []
+    for course in lay_courses(accepted, config):
+        why = doubt([stands.get(id(piece)) for piece in course.pieces])
+        if why is None:
+            found.append((course, _confidence(course, stands, config)))
+        else:
+            rejected.append(_rejection(course.points, *why))
     found.sort(key=lambda each: _merit(*each), reverse=True)
     region = np.zeros(len(cloud), np.int32)
     for number, (course, _) in enumerate(found, start=1):
@@ -107,10 +115,21 @@ def _without_doubles(pieces: list[Piece]) -> list[Piece]:
     return kept
 
 
-def _confidence(course: Course, config: ProfileConfig) -> float:
-    """That of the pieces, weighted by their lengths."""
+def _standing(piece: Piece, atlas: Atlas) -> Standing | None:
+    """How far a piece stands out from its surface."""
+    middle = int(np.flatnonzero(station_mask(piece.fit, piece.span)).mean())
+    return standing(piece.fit, piece.span, atlas.facing(piece.fit.rail.points[middle], piece.fit.rail.n[middle]))
+
+
+def _confidence(course: Course, stands: dict[int, Standing], config: ProfileConfig) -> float:
+    """That of the pieces, weighted by their lengths.
+
+    Args:
+        stands: of each piece, by its id.
+    """
     length = [piece.span[1] - piece.span[0] for piece in course.pieces]
-    return float(np.average([confidence(piece.fit, piece.span, config) for piece in course.pieces], weights=length))
+    each = [confidence(piece.fit, piece.span, config, stands.get(id(piece))) for piece in course.pieces]
+    return float(np.average(each, weights=length))
 
 
 def _merit(course: Course, sure: float) -> float:
@@ -118,11 +137,9 @@ def _merit(course: Course, sure: float) -> float:
     return sure * course.length / (course.length + LONG)
 
 
-def _rejection(line: Float[ndarray, "k 3"], reason: str) -> Rejection:
-    middle = line[len(line) // 2]
-    return Rejection(
-        position_B=(float(middle[0]), float(middle[1]), float(middle[2])), length=float(arc_length(line)[-1]), reason=reason
-    )
+def _rejection(line: Float[ndarray, "k 3"], reason: str, doubtful: bool = False) -> Rejection:
+    x, y, z = line[len(line) // 2].tolist()
+    return Rejection(position_B=(x, y, z), length=float(arc_length(line)[-1]), reason=reason, doubtful=doubtful)
 
 
 def _covers(piece: Piece, line: Float[ndarray, "k 3"]) -> bool:

@@ -1,16 +1,21 @@
 """Is it a groove? Each reason to refuse a candidate, with its figure and limit; and how sure an accepted one is."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.background import Standing
 from weldsim.seam.profile.ends import station_mask, supported, trusted
 from weldsim.seam.profile.refine import BRIDGE, Fit
 
 MISFIT_LIMIT = 0.75
 MIN_SUPPORT = 0.5
 MOST_LAPSES = 0.18
-MIN_STANDING = 9.0
-NOISE_REACH = 0.007  # [m] over which a stereo camera's noise is shared
+LOOKS = 1.5  # looks at the depth, that a groove is longer than: a hole is drawn out to one
+FOUND = 6.5  # score of a `Standing`, from which on it is a groove
+CLEAR = 6.0  # score at which 37 % of the doubt is left
+DOUBTFUL = 3.5  # from which on it is named as one that there may be; noise reaches about 5
 
 
 def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: bool = False) -> str | None:
@@ -20,38 +25,62 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: b
         piece: let it be as short as it is: it may be a part of a longer one.
     """
     section, length = fit.section, span[1] - span[0]
-    support = supported(fit, span, config)
-    contrast, standing = _contrast(fit), _standing(fit, length)
+    support, look = supported(fit, span, config), _look(fit)
     checks = [
         (length < config.min_length, f"{length * 1e3:.1f} mm long, under {config.min_length * 1e3:.0f} mm"),
         (section.width < config.min_width, f"opening {section.width * 1e3:.1f} mm, under {config.min_width * 1e3:.1f} mm"),
         (section.width > config.max_width, f"opening {section.width * 1e3:.1f} mm, over {config.max_width * 1e3:.1f} mm"),
         (length < 2.0 * section.width, f"{length * 1e3:.1f} mm long, under twice its width of {section.width * 1e3:.1f} mm"),
+        (
+            length < LOOKS * look,
+            f"{length * 1e3:.1f} mm long, under {LOOKS:g} times the {look * 1e3:.0f} mm that a noisy cloud is averaged over",
+        ),
         (_shown_depth(fit) < config.min_depth, f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {config.min_depth * 1e3:.2f} mm"),
         (fit.track.misfit > MISFIT_LIMIT, f"cross-sections fit a groove poorly ({fit.track.misfit:.2f}, limit {MISFIT_LIMIT})"),
         (
             _lapses(fit, span) > MOST_LAPSES,
             f"depth comes and goes, absent over {_lapses(fit, span):.0%} of it: a row of holes, or noise",
         ),
-        (contrast < 4.0, f"depth is {contrast:.1f} times its own scatter, under 4"),
-        (standing < MIN_STANDING, f"depth and length stand {standing:.1f} times over the noise, under {MIN_STANDING:g}"),
         (support < MIN_SUPPORT, f"parent surface on both sides over {support:.0%} of it, under {MIN_SUPPORT:.0%}"),
         (_floor_goes_on(fit, span), "its floor goes on as the surface around it: a gap between two objects on a plate"),
     ]
-    by_length = {0, 3, 8} if piece else set()
+    by_length = {0, 3, 4} if piece else set()
     return next((reason for k, (failed, reason) in enumerate(checks) if failed and k not in by_length), None)
 
 
-def confidence(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> float:
-    """0 to 1: support on both sides, agreement with the section, and depth against its scatter, multiplied."""
+def doubt(standings: Sequence[Standing | None]) -> tuple[str, bool] | None:
+    """Why the pieces of a seam may be waves of the surface, one clause, and whether it may be a groove all the same; or None.
+
+    Args:
+        standings: of its pieces; None where no chart shows one.
+    """
+    over = score(standings)
+    if over >= FOUND:
+        return None
+    clause = f"stands {max(over, 0.0):.1f} times over what the surface does elsewhere, under {FOUND:g}"
+    return (f"doubtful: {clause}", True) if over >= DOUBTFUL else (clause, False)
+
+
+def score(standings: Sequence[Standing | None]) -> float:
+    """That of several pieces of one seam, whose backgrounds are independent."""
+    return float(np.sqrt(sum(max(each.score, 0.0) ** 2 for each in standings if each is not None)))
+
+
+def confidence(fit: Fit, span: tuple[float, float], config: ProfileConfig, stands: Standing | None) -> float:
+    """0 to 1: support on both sides, agreement with the section, and how far it stands out, multiplied."""
     explained = max(0.0, 1.0 - fit.track.misfit**2)
-    clear = 1.0 - float(np.exp(-((_contrast(fit) / 8.0) ** 2)))
+    clear = 1.0 - float(np.exp(-((score([stands]) / CLEAR) ** 2)))
     return float(np.clip(supported(fit, span, config) * explained * clear, 0.0, 1.0))
 
 
 def _shown_depth(fit: Fit) -> float:
     """Greatest depth of the blurred section [m]."""
     return float(np.max(fit.section.image(fit.grid.x, np.median(fit.grid.shear, keepdims=True))[0]))
+
+
+def _look(fit: Fit) -> float:
+    """Length [m] of the stretch over which the depth is averaged."""
+    return (2 * fit.track.depth_reach + 1) * fit.rail.step
 
 
 def _lapses(fit: Fit, span: tuple[float, float]) -> float:
@@ -62,27 +91,6 @@ def _lapses(fit: Fit, span: tuple[float, float]) -> float:
     if fit.bridge > BRIDGE:  # what lies across the groove between joined pieces says nothing about them
         known &= trusted(fit, span)[seen[0] : seen[-1] + 1]
     return float(np.mean(local[known] < 0.4)) if known.any() else 1.0
-
-
-def _standing(fit: Fit, length: float) -> float:
-    """Depth over the parent surface's noise, times the root of how many independent looks the length affords.
-
-    Correlated noise now and then draws a short shallow furrow; a groove is deeper or longer.
-    """
-    return _shown_depth(fit) / max(fit.parent.noise, fit.parent.rms, 1e-6) * float(np.sqrt(max(length, 0.0) / NOISE_REACH))
-
-
-def _contrast(fit: Fit) -> float:
-    """Mean amplitude over its standard error, from blocks of stations about as long as the noise is correlated."""
-    seen = fit.track.weight > 0
-    values = fit.track.amplitude[seen]
-    if len(values) < 12:
-        return 0.0
-    block = 6
-    means = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
-    if len(means) < 2:
-        return 0.0
-    return float(means.mean() / max(means.std(ddof=1), 1e-3))
 
 
 def _floor_goes_on(fit: Fit, span: tuple[float, float]) -> bool:

@@ -14,14 +14,18 @@ from weldsim.seam.profile.rail import Rail
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import ORDER, deviation, smooth
 from weldsim.seam.profile.strength import Choice, choose, correlation
+from weldsim.seam.profile.views import correlation_across, deviation_across
 
 BLOCK = 8  # stations averaged together to judge how well the section fits
 LATERAL_REACH = 3  # stations on either side that share a look at the lateral position: as far as noise is correlated
 AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
 AROUND = 20  # stations on either side over which the density of the cloud is taken as even
-CAMERA_REACHES = (0.0, 0.002, 0.0035, 0.005, 0.007)  # [m] over which a camera's noise may be alike
+CAMERA_REACHES = (0.0, 0.002, 0.0035, 0.005, 0.007, 0.010)  # [m] over which a camera's noise may be alike
 TANGENT = 0.004  # [m] of a line's end that gives the direction in which it goes on
 ENOUGH = 0.35  # of the usual data for a station
+FEWEST_ROWS = 6  # independent looks at the groove that tell how noise is alike across it
+QUIET = 5e-5  # [m] least standard deviation of a cell
+MISSING = 1e6  # times its variance: a cell without data
 LEAST = 0.1  # of the density of the whole seam that tells anything
 
 
@@ -34,7 +38,7 @@ class Track:
         weight: (m,) its information, 0 where the groove was not seen.
         amplitude: (m,) apparent depth over the section's depth: 1 in the groove, 0 beside it; NaN without data.
         local: (m,) the same from the shortest look, noisier.
-        reach: stations on either side that share a look at the lateral position.
+        reach: stations on either side that share a look at the lateral position.  depth_reach: at the amplitude.
         misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
     """
 
@@ -43,6 +47,7 @@ class Track:
     amplitude: Float[ndarray, "m"]
     local: Float[ndarray, "m"]
     reach: int
+    depth_reach: int
     misfit: float
 
     @property
@@ -77,10 +82,12 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     least = round(LATERAL_REACH * grid.sparsity)
     ss, mm, sd, _ = _window_sum(each, least).T
     enough = (mm > ENOUGH * _usual(mm)) & (ss > 0)
-    amplitude, local = _amplitude(each, enough, flanked, least)
+    amplitude, local, depth_reach = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
+    if np.count_nonzero(seen) >= FEWEST_ROWS * (2 * least + 1):
+        shift, ss = _correlated_shift(grid, depth - model, slope, known, seen, shift, least)
     shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
     weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)
     if seen.any():
@@ -88,7 +95,48 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
     misfit = _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
-    return Track(section.middle + shift, weights, amplitude, local, least, misfit)
+    return Track(section.middle + shift, weights, amplitude, local, least, depth_reach, misfit)
+
+
+def _correlated_shift(
+    grid: Grid,
+    residual: Float[ndarray, "m w"],
+    slope: Float[ndarray, "m w"],
+    known: Bool[ndarray, "m w"],
+    seen: Bool[ndarray, "m"],
+    shift: Float[ndarray, "m"],
+    reach: int,
+) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:
+    """Lateral shift of each station [m] and its information [1/m^2], by generalised least squares.
+
+    A camera's error is alike across a groove: what the plate beside it shows tells much of what lies under it.
+
+    Args:
+        residual: depth less the section's [m].  slope: how the section changes as it moves to the left.
+        seen: stations with a groove.  shift: a first estimate [m].  reach: stations on either side that share a look.
+    """
+    half = residual.shape[1] // 2
+
+    def pooled(image: Float[ndarray, "m w"]) -> Float[ndarray, "m h"]:
+        pairs = np.where(known, image, 0.0)[:, : 2 * half].reshape(len(image), half, 2).sum(axis=2)
+        return _window_sum(pairs, reach)
+
+    number = pooled(np.ones_like(residual))
+    some = np.maximum(number, 1.0)
+    mean, lead = pooled(residual) / some, pooled(slope) / some
+    held = number > 0
+    rows = np.flatnonzero(seen)[:: 2 * reach + 1]
+    off = np.where(held, mean - shift[:, None] * lead, 0.0)[rows]
+    x = grid.x[: 2 * half].reshape(half, 2).mean(axis=1)
+    sd = deviation_across(np.where(held[rows], np.abs(off), np.nan), QUIET)
+    usual = np.maximum(np.median(number[rows], axis=0), 1.0)
+    tame = 1 / np.maximum(np.abs(off) / (2.5 * sd), 1.0)
+    covariance = correlation_across(off * tame / sd, held[rows], x) * np.outer(sd, sd)
+    loose = np.where(held, np.clip(usual / some - 1, 0.0, None), MISSING) * sd**2
+    systems = covariance + loose[:, :, None] * np.eye(half)
+    pull = np.linalg.solve(systems, lead[..., None])[..., 0]
+    information = np.maximum((pull * lead).sum(axis=1), 1e-18)
+    return (pull * mean).sum(axis=1) / information, information
 
 
 def _beside_other(grid: Grid, section: Section, model: Float[ndarray, "m w"]) -> Bool[ndarray, "m w"]:
@@ -112,10 +160,10 @@ def deepest(section: Section) -> float:
 
 def _amplitude(
     each: Float[ndarray, "m 4"], enough: Bool[ndarray, "m"], flanked: Bool[ndarray, "m"], least: int
-) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"]]:
+) -> tuple[Float[ndarray, "m"], Float[ndarray, "m"], int]:
     """Apparent depth over the section's at each station, over the shortest window that shows it clearly, and over the
-    shortest of all."""
-    looks = []
+    shortest of all; and the stations on either side of the former."""
+    looks, reach = [], least
     for reach in (least, *(reach for reach in AMPLITUDE_REACHES if reach > least)):
         _, mm, _, md = _window_sum(each, reach).T
         looks.append(np.where(enough, md / np.maximum(mm, 1e-18), np.nan))
@@ -123,7 +171,7 @@ def _amplitude(
         core = core[core > 0.3]
         if len(core) < 12 or core.std() < 0.22:
             break
-    return looks[-1], looks[0]
+    return looks[-1], looks[0], reach
 
 
 def _usual(mm: Float[ndarray, "m"]) -> Float[ndarray, "m"]:

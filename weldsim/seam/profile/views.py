@@ -9,7 +9,7 @@ from numpy import ndarray
 SAME_VIEW = 2e-4  # [m] blocks whose bottoms the sight line displaces alike within this are averaged
 MOST_VIEWS = 5
 FEWEST_BLOCKS = 4  # in a view: a median of fewer is no robust one
-REACHES = (0.001, 0.002, 0.003, 0.004, 0.0055, 0.0075)  # [m] correlation lengths tried for the noise
+REACHES = (0.001, 0.002, 0.003, 0.004, 0.0055, 0.0075, 0.0105)  # [m] correlation lengths tried for the noise
 SHARPNESS = 2.0  # with which a worse correlation length counts less
 USUAL_REACH = 0.0035  # [m] where there is too little to tell
 QUIETEST = (1e-4, 2e-4)  # [m] least standard deviation of a cell: of blocks that agree to that, and of any others
@@ -43,7 +43,7 @@ class Views:
         shear: (g,).  depth, weight: (g, w) robust mean [m] and inverse variance [1/m^2], 0 where empty.
         at: (g, w) mean lateral place of the points behind each mean [m].
         of: (b,) view of each block.  each: (b, w) the part of each cell in that weight.
-        white: (w, w) maps cells over their deviation to numbers of unit variance that hang together no more.
+        white: (w, w) maps cells over their deviation to independent numbers of unit variance.
         quiet: whether the blocks agree to within QUIETEST.
     """
 
@@ -67,7 +67,7 @@ def gather(blocks: Blocks, depth: float, noise: float) -> Views:
     seen = np.where(known, blocks.depth, np.nan)
     off = np.nan_to_num(seen - middle[of])
     least = _least(off, known)
-    deviation = _deviation(np.where(known, np.abs(off), np.nan), max(noise, least))
+    deviation = deviation_across(np.where(known, np.abs(off), np.nan), max(noise, least))
     tame = 1 / np.maximum(np.abs(off) / (2.5 * deviation), 1.0)
     each = known * blocks.number / blocks.full * tame / deviation**2
     weight, total, place = (np.zeros_like(middle) for _ in range(3))
@@ -75,7 +75,7 @@ def gather(blocks: Blocks, depth: float, noise: float) -> Views:
     np.add.at(total, of, each * np.nan_to_num(seen))
     np.add.at(place, of, each * (blocks.at - blocks.x))
     shear = np.bincount(of, weights=blocks.shear) / np.bincount(of)
-    white = np.linalg.inv(np.linalg.cholesky(_correlation(off * tame / deviation, known, blocks.x)))
+    white = np.linalg.inv(np.linalg.cholesky(correlation_across(off * tame / deviation, known, blocks.x)))
     some = np.maximum(weight, 1e-30)
     return Views(shear, blocks.x + place / some, total / some, weight, of, each, white, least < QUIETEST[1])
 
@@ -119,14 +119,14 @@ def _least(off: Float[ndarray, "b w"], known: Bool[ndarray, "b w"]) -> float:
     return float(np.clip(np.sqrt((off * off).sum() / max(np.count_nonzero(known), 1)), *QUIETEST))
 
 
-def _deviation(off: Float[ndarray, "b w"], noise: float) -> Float[ndarray, "w"]:
+def deviation_across(off: Float[ndarray, "b w"], noise: float) -> Float[ndarray, "w"]:
     """Standard deviation of a cell [m] in each column, robust, evened out over 3.5 mm."""
     spread = 1.4826 * _median(off)
     spread = np.where(np.isfinite(spread), spread, noise)
     return np.maximum(np.convolve(np.pad(spread, 3, mode="edge"), np.ones(7) / 7, mode="valid"), noise)
 
 
-def _correlation(off: Float[ndarray, "b w"], known: Bool[ndarray, "b w"], x: Float[ndarray, "w"]) -> Float[ndarray, "w w"]:
+def correlation_across(off: Float[ndarray, "b w"], known: Bool[ndarray, "b w"], x: Float[ndarray, "w"]) -> Float[ndarray, "w w"]:
     """Covariance of cells across the seam, over their variances: of the noise, as seen, and of the parent surface.
 
     The noise is part white, part with correlation exp(-(distance / length)^2).
