@@ -3,7 +3,8 @@
 What makes views disagree is known in kind and size: an offset of each view's depth, one mistake of the hand-eye
 calibration that all views share in their cameras' frames, and little else. The corrections are the most probable ones
 given that (maximum a posteriori): surfaces that views share are drawn together along their normals, and what surfaces do
-not tell, such as sliding along a plane, keeps its most probable value given what they do tell.
+not tell, such as sliding along a plane, keeps its most probable value given what they do tell. How large mistakes are in
+this cell is told by the views too (empirical Bayes): where noise alone explains how they differ, hardly anything is moved.
 
 No view sees where the base is: a motion of all views together stays unknown, and the corrections leave it at its most
 probable value, about the mean of the views. `Registration.unseen` says how far off that may be.
@@ -30,7 +31,10 @@ NORMAL_ARM = 0.03  # [m] a difference of normals counts as so much distance when
 ALIKE = 0.90  # least cosine between the normals of partners (26 deg)
 ROUNDS = (0.010, 0.004, 0.0015, 0.0007, 0.0007)  # [m] distance at which a pair keeps a quarter of its say, round by round
 SLACK = 3e-4  # [m] surfaces as a camera shows them are wrong by this much beyond their noise
-SHARED = 0.25  # what one pair tells: neighbours share their noise
+SHARED = 0.25  # what one pair tells to begin with: neighbours share their noise
+CLUSTERS = (0.02, 0.05)  # [m] cubes whose pairs' distances are added up, to see how far noise is shared
+SETTLING = 4  # steps with the weights found from that
+SCALES = (0.03, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7)  # sizes of mistakes that are compared, over those expected
 ENOUGH = 30  # pairs without which a view counts as alone
 MOST = 2500  # patches of a view that take part
 
@@ -146,8 +150,15 @@ def _lined_up(
             information, pull = _normal_equations(views, pairs, scale, prior, x)
             x = x + np.linalg.solve(information, pull).reshape(x.shape)
             views = _views(patches, poses, x)
+    factor = max(_overdispersion(views, pairs, size) for size in CLUSTERS)
+    pairs = [replace(p, weight=p.weight / factor) for p in pairs]
+    scaled = _scaled_prior(views, pairs, prior, x, config)
+    for _ in range(SETTLING):
+        information, pull = _normal_equations(views, pairs, ROUNDS[-1], scaled, x)
+        x = x + np.linalg.solve(information, pull).reshape(x.shape)
+        views = _views(patches, poses, x)
     moved = tuple(_corrected(cloud, view.X, float(row[6])) for cloud, view, row in zip(clouds, views, x, strict=True))
-    return moved, _registration(start, views, x, pairs, information)
+    return moved, _registration(start, views, x, pairs, information - scaled + prior)
 
 
 def _thinned(patches: Patches) -> Patches:
@@ -169,10 +180,34 @@ def _views(patches: list[Patches], poses: list[Transform], x: Float[ndarray, "v 
     return out
 
 
-def _prior(count: int, c: RegisterConfig) -> Float[ndarray, "n n"]:
-    """Inverse covariance of all views' mistakes: their own, and one that they share in their cameras' frames."""
-    own = np.diag(np.array([*[c.view_sigma] * 3, *[c.view_turn] * 3, c.offset_sigma]) ** 2)
-    shared = np.diag(np.array([*[c.hand_eye_sigma] * 3, *[c.hand_eye_turn] * 3, 0.0]) ** 2)
+def _scaled_prior(
+    views: list[_View], pairs: list[_Pairs], prior: Float[ndarray, "n n"], x: Float[ndarray, "v 7"], config: RegisterConfig
+) -> Float[ndarray, "n n"]:
+    """The prior with depth offsets and poses as far off as is likeliest here: both scales by marginal likelihood.
+
+    About x, where the pull of the data balances the prior, minus its log likelihood is x' H x / 2 - h' x.
+    """
+    information, _ = _normal_equations(views, pairs, ROUNDS[-1], prior, x)
+    data = information - prior
+    _, pull = _normal_equations(views, pairs, ROUNDS[-1], np.zeros_like(prior), x)
+    h = data @ x.ravel() + pull
+
+    def likelihood(candidate: Float[ndarray, "n n"]) -> float:
+        total = data + candidate
+        return 0.5 * float(np.linalg.slogdet(candidate)[1] - np.linalg.slogdet(total)[1] + h @ np.linalg.solve(total, h))
+
+    candidates = [_prior(len(views), config, offsets, poses) for offsets in SCALES for poses in SCALES]
+    return max(candidates, key=likelihood)
+
+
+def _prior(count: int, c: RegisterConfig, offsets: float = 1.0, poses: float = 1.0) -> Float[ndarray, "n n"]:
+    """Inverse covariance of all views' mistakes: their own, and one that they share in their cameras' frames.
+
+    Args:
+        offsets, poses: factors on the standard deviations of the depths' offsets and of everything else.
+    """
+    own = np.diag(np.array([*[poses * c.view_sigma] * 3, *[poses * c.view_turn] * 3, offsets * c.offset_sigma]) ** 2)
+    shared = np.diag(np.array([*[poses * c.hand_eye_sigma] * 3, *[poses * c.hand_eye_turn] * 3, 0.0]) ** 2)
     return np.linalg.inv(np.kron(np.eye(count), own) + np.kron(np.ones((count, count)), shared))
 
 
@@ -232,6 +267,21 @@ def _normal_equations(
         matrix[np.ix_(at, at)] += J.T @ (w[:, None] * J)
         pull[at] -= J.T @ (w * r)
     return matrix, pull
+
+
+def _overdispersion(views: list[_View], pairs: list[_Pairs], size: float) -> float:
+    """Variance of the pull of all pairs within cubes of `size` [m], over what independent pairs of their weights would have;
+    at least 1. A depth camera's error is alike over centimetres: a thousand pairs there tell little more than one.
+    """
+    squares = total = 0.0
+    for p in pairs:
+        if len(p.in_a):
+            r, _ = _distance(views[p.a], views[p.b], p.in_a, p.in_b)
+            cube = np.floor(views[p.a].centres[p.in_a] / size).astype(np.int64)
+            _, which = np.unique(cube, axis=0, return_inverse=True)
+            squares += float((np.bincount(which.ravel(), weights=p.weight * r) ** 2).sum())
+            total += float(p.weight.sum())
+    return max(1.0, squares / total) if total else 1.0
 
 
 def _registration(
