@@ -59,11 +59,13 @@ class Standing:
         return self.ratio - FREEDOM * float(np.sqrt(self.looks))
 
 
-def standing(fit: Fit, span: tuple[float, float], charts: Sequence[Chart]) -> Standing | None:
+def standing(
+    fit: Fit, span: tuple[float, float], charts: Sequence[Chart], others: Sequence[Float[ndarray, "_ 3"]] = ()
+) -> Standing | None:
     """How far a candidate stands out from its surface, in the chart that shows it best; None where none shows half of it.
 
     Args:
-        charts: seen from above that surface.
+        charts: seen from above that surface.  others: (j, 3) places on other grooves, no background either [m]; see `lips`.
     """
     blocks = _blocks(fit, span)
     if blocks is None:
@@ -74,7 +76,15 @@ def standing(fit: Fit, span: tuple[float, float], charts: Sequence[Chart]) -> St
         shown = float(np.isfinite(own).mean()) * facing
         if np.isfinite(own).mean() >= SHOWN and np.isfinite(own).sum() >= 2 and shown > best_shown:
             best, best_shown = (chart, own[np.isfinite(own)]), shown
-    return None if best is None else _compared(fit, blocks, *best)
+    return None if best is None else _compared(blocks, (lips(fit, span), *others), *best)
+
+
+def lips(fit: Fit, span: tuple[float, float]) -> Float[ndarray, "j 3"]:
+    """Places on the surface that a groove, as a camera blurs it, may reach [m], a millimetre apart."""
+    stations = np.flatnonzero(trusted(fit, span))
+    reach = 0.5 * (fit.section.width + fit.section.blur)
+    x = np.arange(-reach, reach + 5e-4, 1e-3)
+    return (fit.rail.points[stations][:, None] + x[:, None] * fit.rail.e[stations][:, None]).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +94,12 @@ class _Blocks:
     Attributes:
         points: (m, ALONG, w, 3) samples of each block [m].  x: (w,) their places across [m].
         section: (w,) apparent depth [m].  core: (w,) samples in it.
-        lips: (j, 3) all that may belong to the groove [m].
     """
 
     points: Float[ndarray, "m a w 3"]
     x: Float[ndarray, "w"]
     section: Float[ndarray, "w"]
     core: Bool[ndarray, "w"]
-    lips: Float[ndarray, "j 3"]
 
 
 def _blocks(fit: Fit, span: tuple[float, float]) -> _Blocks | None:
@@ -110,9 +118,7 @@ def _blocks(fit: Fit, span: tuple[float, float]) -> _Blocks | None:
     points = rail.points[picked][:, :, None] + x[:, None] * rail.e[picked][:, :, None]
     points = points + (fit.parent.c * x**2)[:, None] * rail.n[picked][:, :, None]
     section = fit.section.image(x, np.median(fit.grid.shear, keepdims=True))[0][0]
-    lateral = np.arange(-reach, reach + 5e-4, 1e-3)
-    lips = (rail.points[stations][:, None] + lateral[:, None] * rail.e[stations][:, None]).reshape(-1, 3)
-    return _Blocks(points, x, section, np.abs(x) < reach, lips)
+    return _Blocks(points, x, section, np.abs(x) < reach)
 
 
 def _own(fit: Fit, blocks: _Blocks, chart: Chart) -> tuple[Float[ndarray, "m"], float]:
@@ -126,10 +132,11 @@ def _own(fit: Fit, blocks: _Blocks, chart: Chart) -> tuple[Float[ndarray, "m"], 
     return amplitude[0], facing
 
 
-def _compared(fit: Fit, blocks: _Blocks, chart: Chart, own: Float[ndarray, "k"]) -> Standing:
+def _compared(blocks: _Blocks, grooves: Sequence[Float[ndarray, "_ 3"]], chart: Chart, own: Float[ndarray, "k"]) -> Standing:
+    """The candidate's amplitudes against those elsewhere in a chart, off all `grooves` [m]."""
     cells = _cells(chart, blocks.points)
     free = chart.valid.copy()
-    row, column = _cells(chart, blocks.lips).T
+    row, column = _cells(chart, np.concatenate(grooves)).T
     inside = (row >= 0) & (column >= 0) & (row < free.shape[0]) & (column < free.shape[1])
     free[row[inside], column[inside]] = False
     amplitude, rough = _amplitudes(blocks, cells, _shifts(cells, chart), free, chart.height)

@@ -14,7 +14,7 @@ from weldsim.curves import arc_length, project
 from weldsim.records import PointCloud, Rejection, SeamFindings
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.atlas import Atlas, make_atlas
-from weldsim.seam.profile.background import Standing, standing
+from weldsim.seam.profile.background import Standing, lips, standing
 from weldsim.seam.profile.beyond import carry_on
 from weldsim.seam.profile.branches import part_at_branches
 from weldsim.seam.profile.corners import lay_courses
@@ -23,7 +23,7 @@ from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.grow import grow, uncovered
 from weldsim.seam.profile.join import Piece, gaps, join_pieces
-from weldsim.seam.profile.judge import confidence, doubt, refusal
+from weldsim.seam.profile.judge import DOUBTFUL, confidence, doubt, refusal, score
 from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit
 from weldsim.seam.profile.track import deepest
@@ -45,7 +45,7 @@ def find_seams_profile(cloud: PointCloud, config: ProfileConfig, threshold_facto
     atlas = make_atlas(cloud)
     lines, threshold = atlas.coarse_lines(config, threshold_factor)
     accepted, rejected = _search(atlas, lines, config)
-    stands = {id(piece): stand for piece in accepted if (stand := _standing(piece, atlas)) is not None}
+    stands = _standings(accepted, atlas)
     found: list[tuple[Course, float]] = []
     for course in lay_courses(accepted, config):
         why = doubt([stands.get(id(piece)) for piece in course.pieces])
@@ -115,10 +115,23 @@ def _without_doubles(pieces: list[Piece]) -> list[Piece]:
     return kept
 
 
-def _standing(piece: Piece, atlas: Atlas) -> Standing | None:
-    """How far a piece stands out from its surface."""
-    middle = int(np.flatnonzero(station_mask(piece.fit, piece.span)).mean())
-    return standing(piece.fit, piece.span, atlas.facing(piece.fit.rail.points[middle], piece.fit.rail.n[middle]))
+def _standings(pieces: list[Piece], atlas: Atlas) -> dict[int, Standing]:
+    """How far each piece stands out from its surface, by its id; what may well be a groove is no background of the others."""
+
+    def measured(piece: Piece, others: list[Float[ndarray, "_ 3"]]) -> Standing | None:
+        middle = int(np.flatnonzero(station_mask(piece.fit, piece.span)).mean())
+        charts = atlas.facing(piece.fit.rail.points[middle], piece.fit.rail.n[middle])
+        return standing(piece.fit, piece.span, charts, others)
+
+    alone = [measured(piece, []) for piece in pieces]
+    likely = {id(piece): lips(piece.fit, piece.span) for piece, each in zip(pieces, alone, strict=True) if score([each]) > DOUBTFUL}
+    found = {}
+    for piece, each in zip(pieces, alone, strict=True):
+        others = [places for key, places in likely.items() if key != id(piece)]
+        again = measured(piece, others) if others else each
+        if again is not None:
+            found[id(piece)] = again
+    return found
 
 
 def _confidence(course: Course, stands: dict[int, Standing], config: ProfileConfig) -> float:
