@@ -20,7 +20,7 @@ from weldsim.seam.profile.strength import Choice
 from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
 from weldsim.seam.profile.views import Blocks, agree
 
-EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
+EXTEND = 0.025  # [m] how far beyond its known part the groove is looked for, each time
 BLOCK = 8  # stations averaged together for the cross-section fit
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
 FEWEST_CELLS = 40  # fewer do not fix a cross-section

@@ -23,6 +23,9 @@ AROUND = 20  # stations on either side over which the density of the cloud is ta
 CAMERA_REACHES = (0.0, 0.002, 0.0035, 0.005, 0.007, 0.010)  # [m] over which a camera's noise may be alike
 TANGENT = 0.004  # [m] of a line's end that gives the direction in which it goes on
 ENOUGH = 0.35  # of the usual data for a station
+LONGEST_DIP = 0.045  # [m] over which a groove may be hidden by noise
+LEAST_SPREAD = 0.05  # of the amplitude, over the amplitude
+ABSENT = 3.0  # log likelihood ratio from which on a groove is not there
 FEWEST_ROWS = 6  # independent looks at the groove that tell how noise is alike across it
 QUIET = 5e-5  # [m] least standard deviation of a cell
 MISSING = 1e6  # times its variance: a cell without data
@@ -85,6 +88,8 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     amplitude, local, depth_reach = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
+    seen |= _dips(np.nan_to_num(amplitude, nan=np.inf), seen, enough & flanked, grid.step)
+    groove |= seen
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
     if np.count_nonzero(seen) >= FEWEST_ROWS * (2 * least + 1):
         shift, ss = _correlated_shift(grid, depth - model, slope, known, seen, shift, least)
@@ -172,6 +177,44 @@ def _amplitude(
         if len(core) < 12 or core.std() < 0.22:
             break
     return looks[-1], looks[0], reach
+
+
+def _dips(
+    amplitude: Float[ndarray, "m"], seen: Bool[ndarray, "m"], known: Bool[ndarray, "m"], step: float
+) -> Bool[ndarray, "m"]:
+    """Stations between two seen ones at which the amplitude is off, but by no more than the noise makes likely.
+
+    The likelihood ratio of "no groove there" to "a groove as everywhere" decides, with the spread and the correlation of the
+    amplitude where the groove is seen. Stations without data say nothing, and are no dip.
+    """
+    out = np.zeros(len(seen), bool)
+    if np.count_nonzero(seen) < 4 * AROUND:
+        return out
+    values = amplitude[seen]
+    middle, high = np.quantile(values, [0.5, 0.84])  # from above: below, what is off is not among them
+    spread = max(float(high - middle) / float(middle), LEAST_SPREAD)
+    alike = _alike(values - middle)
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], seen.astype(np.int8), [1]])))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        inside = slice(int(start), int(stop))
+        if start == 0 or stop == len(seen) or (stop - start) * step > LONGEST_DIP or not known[inside].all():
+            continue
+        a = np.clip(amplitude[inside] / middle, 0.0, 2.0)
+        if float((1 - 2 * a).sum()) / (2 * spread**2 * alike) < ABSENT:
+            out[inside] = True
+    return out
+
+
+def _alike(values: Float[ndarray, "n"]) -> float:
+    """Over how many stations values are alike: the sum of their correlations up to the first that is small."""
+    power = max(float(values @ values) / len(values), 1e-12)
+    total = 1.0
+    for lag in range(1, len(values) // 4):
+        correlation = float(values[lag:] @ values[:-lag]) / (len(values) - lag) / power
+        if correlation < 0.1:
+            break
+        total += 2 * correlation
+    return total
 
 
 def _usual(mm: Float[ndarray, "m"]) -> Float[ndarray, "m"]:
