@@ -30,6 +30,7 @@ DEEPEST = 0.020  # [m] below the surface, down to which a point may lie in a gro
 AHEAD = 4  # points of a line to either side that tell which way it leads
 STRETCH = 0.010  # [m] of a line over which the same views are used
 FEWEST_IN_STRETCH = 20  # points near such a stretch that a view must have to cover it
+NEAR_LINE = 0.006  # [m] to either side of a line: what lies there tells where the groove is
 CROSSING = 0.6  # [rad] between the sight lines of two views from which on they cross
 SAME_LINE = 0.006  # [m] a coarse line this close to a stronger one, over most of its length, is the same
 MOST_LINES = 24
@@ -131,8 +132,8 @@ class Atlas:
         offset = self.cloud.points[index] - line[nearest]
         below = -np.einsum("ij,ij->i", offset, normals[nearest])
         below = np.where((below > 0) & (below < DEEPEST), below, 0.0)
-        stretch, left = _places(line, normals, nearest, offset + below[:, None] * sight)
-        allowed = _views_by_stretch(self.cloud.viewpoints, view[index], stretch, left, line, normals)
+        stretch, across = _places(line, normals, nearest, offset + below[:, None] * sight)
+        allowed = _views_by_stretch(self.cloud.viewpoints, view[index], stretch, across, line, normals)
         return index[allowed[view[index], stretch]]
 
 
@@ -179,8 +180,9 @@ def _near(chart: Chart, line: Float[ndarray, "k 3"]) -> Int[ndarray, "m"]:
 
 def _places(
     line: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], nearest: Int[ndarray, "m"], offset: Float[ndarray, "m 3"]
-) -> tuple[Int[ndarray, "m"], Bool[ndarray, "m"]]:
-    """On which stretch of a line points lie, the first beyond its beginning and the last beyond its end; and whether to its left.
+) -> tuple[Int[ndarray, "m"], Float[ndarray, "m"]]:
+    """On which stretch of a line points lie, the first beyond its beginning and the last beyond its end; and how far to its
+    left [m].
 
     Args:
         line, normals: as in `Atlas.around`.  nearest: (m,) point of the line nearest to each.  offset: (m, 3) from there [m].
@@ -188,16 +190,16 @@ def _places(
     at = np.arange(len(line))
     ahead = unit(line[np.minimum(at + AHEAD, len(line) - 1)] - line[np.maximum(at - AHEAD, 0)])
     along = arc_length(line)[nearest] + np.einsum("ij,ij->i", offset, ahead[nearest])
-    left = np.einsum("ij,ij->i", offset, np.cross(normals, ahead)[nearest]) > 0
+    across = np.einsum("ij,ij->i", offset, np.cross(normals, ahead)[nearest])
     stretch = np.floor(along / STRETCH).astype(int)
-    return stretch - stretch.min(initial=0), left
+    return stretch - stretch.min(initial=0), across
 
 
 def _views_by_stretch(
     viewpoints: Float[ndarray, "v 3"],
     view: Int[ndarray, "m"],
     stretch: Int[ndarray, "m"],
-    left: Bool[ndarray, "m"],
+    across: Float[ndarray, "m"],
     line: Float[ndarray, "k 3"],
     normals: Float[ndarray, "k 3"],
 ) -> Bool[ndarray, "v b"]:
@@ -205,15 +207,21 @@ def _views_by_stretch(
 
     A groove looks different from the left and from the right: its far wall is hidden, and a stereo camera blurs along its
     own image. Points of sight lines that cross are two pictures of it, whose mean is the picture of another groove.
-    Where an image ends aslant across the groove, its view shows the plate on one side only, and covers that stretch no more.
+    Where an image ends aslant across the groove, its view shows the plate on one side only, and covers that stretch no more;
+    nor does one that shows the plate, and of the groove hardly anything.
 
     Args:
-        viewpoints: [m].  view, stretch, left: (m,) of each point near the line, and on which side of it.
+        viewpoints: [m].  view, stretch, across: (m,) of each point near the line, and how far to its left [m].
     """
     stretches = int(stretch.max(initial=0)) + 1
-    place = (view * stretches + stretch) * 2 + left
-    count = np.bincount(place, minlength=2 * stretches * len(viewpoints)).reshape(len(viewpoints), stretches, 2).astype(float)
-    usual = np.array([[np.median(side[side > 0]) if side.any() else np.inf for side in each.T] for each in count])[:, None]
+    parts = [across > 0, across <= 0, np.abs(across) < NEAR_LINE]
+    count = np.stack([np.bincount((view * stretches + stretch)[part], minlength=stretches * len(viewpoints)) for part in parts], 1)
+    count = count.reshape(len(viewpoints), stretches, len(parts)).astype(float)
+    # Of the groove most stretches may show little, where a better view's points replaced others: its usual is its best.
+    high = np.array([0.5, 0.5, 0.9])
+    usual = np.array(
+        [[np.quantile(part[part > 0], q) if part.any() else np.inf for part, q in zip(each.T, high, strict=True)] for each in count]
+    )[:, None]
     covered = (count >= np.maximum(0.5 * usual, 0.5 * FEWEST_IN_STRETCH)).all(axis=2)
     away = viewpoints - line.mean(axis=0)
     distance = np.linalg.norm(away, axis=1)

@@ -30,7 +30,7 @@ STEEP = 0.9  # [rad] that the two sides may differ before that
 OTHER_VIEW = 0.08  # [rad] by which the sight turns from one block to the next only from view to view
 WIDEST_FOOTPRINT = 1.2  # of the camera's window on a surface seen at 35 deg, over one that faces it
 SETTLED = 2e-4  # [m] a rail that moves less than this is done
-BRIDGE = 0.010  # [m] a groove goes on across this without being seen
+BRIDGE = 0.015  # [m] a groove goes on across this without being seen
 NEAR_RAIL = 0.008  # [m] above and below a rail that lies on the parent surface; a clamp at the end of one is higher
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
 

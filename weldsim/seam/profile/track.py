@@ -179,9 +179,7 @@ def _amplitude(
     return looks[-1], looks[0], reach
 
 
-def _dips(
-    amplitude: Float[ndarray, "m"], seen: Bool[ndarray, "m"], known: Bool[ndarray, "m"], step: float
-) -> Bool[ndarray, "m"]:
+def _dips(amplitude: Float[ndarray, "m"], seen: Bool[ndarray, "m"], known: Bool[ndarray, "m"], step: float) -> Bool[ndarray, "m"]:
     """Stations between two seen ones at which the amplitude is off, but by no more than the noise makes likely.
 
     The likelihood ratio of "no groove there" to "a groove as everywhere" decides, with the spread and the correlation of the
