@@ -7,9 +7,13 @@ from numpy import ndarray
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.parent import CELL
 from weldsim.seam.profile.refine import BRIDGE, Fit, sided
+from weldsim.seam.profile.track import ABSENT, LONGEST_DIP
 
 NEAR = 0.014  # [m] beyond the lips' surroundings, over which the plate's edge is read
 SHORTEST_GAP = 0.005  # [m] a shorter stretch unseen is not worth a word
+ONE_SIDED = 0.003  # [m] a groove is followed past the plate on one side where no edge of it is seen
+PAST_EDGE = 0.002  # [m] and past an edge that is
+ASLANT = 0.3  # slope of an edge across the groove, read on one side of it alone
 RUN_OUT = 0.010  # [m] the most an end is carried past the last station whose depth can be trusted
 
 
@@ -27,22 +31,32 @@ def seam_span(fit: Fit, config: ProfileConfig) -> tuple[float, float]:
 def _end(fit: Fit, last: int, way: int) -> float:
     amplitude, step = fit.track.amplitude, fit.rail.step
     one_side = fit.parent.support.max(axis=1) > 0.5
+    edge = _edge_crossing(fit, way, last * step)
+    most = ONE_SIDED if edge is None else max((edge - last * step) * way + PAST_EDGE, 0.0)
     j = last
     while 0 <= j + way < len(amplitude) and 0.5 < np.nan_to_num(amplitude[j + way]) < 1.5 and one_side[j + way]:
+        if abs(j + way - last) * step > most:  # a bevel goes on past its partner, a groove does not
+            return j * step
         j += way
-    beyond = j + way
-    here = j * step
+    beyond, here = j + way, j * step
+    if edge is not None and step <= (edge - here) * way < LONGEST_DIP:
+        # Noise may hide the last of a groove that runs out over the plate's edge.
+        stretch = slice(j + 1, round(edge / step) + 1) if way > 0 else slice(max(round(edge / step), 0), j)
+        if np.isfinite(amplitude[stretch]).mean() > 0.5 and fit.track.absence(stretch) < ABSENT:
+            return edge
     if 0 <= beyond < len(amplitude) and np.nan_to_num(amplitude[beyond], nan=9.0) <= 0.5 and one_side[beyond]:
         drop = amplitude[j] - amplitude[beyond]
         return here + way * step * float(np.clip((amplitude[j] - 0.5) / max(drop, 1e-6), 0.0, 1.0))
-    edge = _edge_crossing(fit, way, here)
     if edge is None:
         return here
-    return float(np.clip(edge, here - 0.002, here + RUN_OUT) if way > 0 else np.clip(edge, here - RUN_OUT, here + 0.002))
+    return float(np.clip(edge, here - PAST_EDGE, here + RUN_OUT) if way > 0 else np.clip(edge, here - RUN_OUT, here + PAST_EDGE))
 
 
 def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
-    """Arc length [m] at which the parent surface's edge crosses the groove, or None where it has no edge nearby."""
+    """Arc length [m] at which the parent surface's edge crosses the groove, or None where it has no edge nearby.
+
+    Where the plate on one side goes on, the groove ends with the other plate.
+    """
     s, x = fit.parent.cells.T
     near = (np.abs(x) < fit.inner + NEAR) & (np.abs(s - here) < 0.045)
     if np.count_nonzero(near) < 20:
@@ -58,12 +72,22 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     if not ends:
         return None
     across, edge = np.array(ends).T
-    if np.mean((here + way * 0.044 - edge) * way < CELL) > 0.3 or (across > 0).sum() < 3 or (across < 0).sum() < 3:
+    goes_on = (here + way * 0.044 - edge) * way < CELL
+    sides = [side for side in (across > 0, across < 0) if side.sum() >= 3 and goes_on[side].mean() <= 0.3]
+    if not sides:
         return None
+    if len(sides) == 1:
+        return _one_edge(across[sides[0]], edge[sides[0]]) if goes_on[~sides[0]].mean() > 0.7 else None
     slope, level = _median_line(across, edge)
     off = np.abs(edge - level - slope * across)
     keep = off <= max(2.5 * float(np.median(off)), 0.0015)
     return float(np.polyval(np.polyfit(across[keep], edge[keep], 1), 0.0)) if keep.sum() >= 6 else None
+
+
+def _one_edge(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> float:
+    """Where the edge of the plate on one side, carried on to the groove, crosses it [m]; square unless it is clearly aslant."""
+    slope, level = _median_line(across, edge)
+    return level if abs(slope) > ASLANT else float(np.median(edge))
 
 
 def _median_line(x: Float[ndarray, "k"], y: Float[ndarray, "k"]) -> tuple[float, float]:

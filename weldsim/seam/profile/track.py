@@ -22,6 +22,7 @@ AMPLITUDE_REACHES = (3, 6, 12)  # the same for the depth
 AROUND = 20  # stations on either side over which the density of the cloud is taken as even
 CAMERA_REACHES = (0.0, 0.002, 0.0035, 0.005, 0.007, 0.010, 0.016, 0.025)  # [m] over which a camera's noise may be alike
 TANGENT = 0.004  # [m] of a line's end that gives the direction in which it goes on
+TURN = 8.0  # stations beyond the last one seen, over which a line that goes straight on gains its own deviation again
 ENOUGH = 0.35  # of the usual data for a station
 LONGEST_DIP = 0.045  # [m] over which a groove may be hidden by noise
 LEAST_SPREAD = 0.05  # of the amplitude, over the amplitude
@@ -43,6 +44,8 @@ class Track:
         local: (m,) the same from the shortest look, noisier.
         reach: stations on either side that share a look at the lateral position.  depth_reach: at the amplitude.
         misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
+        usual: amplitude where the groove is seen.  spread: its standard deviation over `usual`.  alike: stations over which
+            that is alike; all as the noise makes them.
     """
 
     offset: Float[ndarray, "m"]
@@ -52,12 +55,20 @@ class Track:
     reach: int
     depth_reach: int
     misfit: float
+    usual: float = 1.0
+    spread: float = 0.0
+    alike: float = 1.0
 
     @property
     def core(self) -> slice:
         """From the first to the last station seen."""
         seen = np.flatnonzero(self.weight > 0)
         return slice(int(seen[0]), int(seen[-1]) + 1)
+
+    def absence(self, part: slice) -> float:
+        """Log likelihood ratio of "no groove" to "a groove as everywhere" over a stretch of stations; those without data
+        say nothing."""
+        return _absence(self.amplitude[part], self.usual, self.spread, self.alike)
 
 
 def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> Track:
@@ -88,7 +99,8 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     amplitude, local, depth_reach = _amplitude(each, enough, flanked, least)
     groove = enough & (np.nan_to_num(amplitude) > 0.5) & (np.nan_to_num(amplitude) < 1.7)
     seen = groove & flanked
-    seen |= _dips(np.nan_to_num(amplitude, nan=np.inf), seen, enough & flanked, grid.step)
+    usual, spread, alike = _waver(amplitude[seen])
+    seen |= _dips(amplitude, seen, enough & flanked, grid.step, (usual, spread, alike))
     groove |= seen
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
     if np.count_nonzero(seen) >= FEWEST_ROWS * (2 * least + 1):
@@ -100,7 +112,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
     misfit = _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
-    return Track(section.middle + shift, weights, amplitude, local, least, depth_reach, misfit)
+    return Track(section.middle + shift, weights, amplitude, local, least, depth_reach, misfit, usual, spread, alike)
 
 
 def _correlated_shift(
@@ -179,28 +191,41 @@ def _amplitude(
     return looks[-1], looks[0], reach
 
 
-def _dips(amplitude: Float[ndarray, "m"], seen: Bool[ndarray, "m"], known: Bool[ndarray, "m"], step: float) -> Bool[ndarray, "m"]:
+def _dips(
+    amplitude: Float[ndarray, "m"],
+    seen: Bool[ndarray, "m"],
+    known: Bool[ndarray, "m"],
+    step: float,
+    waver: tuple[float, float, float],
+) -> Bool[ndarray, "m"]:
     """Stations between two seen ones at which the amplitude is off, but by no more than the noise makes likely.
 
-    The likelihood ratio of "no groove there" to "a groove as everywhere" decides, with the spread and the correlation of the
-    amplitude where the groove is seen. Stations without data say nothing, and are no dip.
+    Args:
+        known: stations with enough data: others are no dip.  waver: usual amplitude, its relative spread, and over how many
+            stations that is alike.
     """
     out = np.zeros(len(seen), bool)
-    if np.count_nonzero(seen) < 4 * AROUND:
-        return out
-    values = amplitude[seen]
-    middle, high = np.quantile(values, [0.5, 0.84])  # from above: below, what is off is not among them
-    spread = max(float(high - middle) / float(middle), LEAST_SPREAD)
-    alike = _alike(values - middle)
     edges = np.flatnonzero(np.diff(np.concatenate([[1], seen.astype(np.int8), [1]])))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        inside = slice(int(start), int(stop))
-        if start == 0 or stop == len(seen) or (stop - start) * step > LONGEST_DIP or not known[inside].all():
-            continue
-        a = np.clip(amplitude[inside] / middle, 0.0, 2.0)
-        if float((1 - 2 * a).sum()) / (2 * spread**2 * alike) < ABSENT:
-            out[inside] = True
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        whole = start > 0 and stop < len(seen) and (stop - start) * step <= LONGEST_DIP and known[start:stop].all()
+        if whole and _absence(amplitude[start:stop], *waver) < ABSENT:
+            out[start:stop] = True
     return out
+
+
+def _absence(amplitude: Float[ndarray, "k"], usual: float, spread: float, alike: float) -> float:
+    """As `Track.absence`."""
+    known = amplitude[np.isfinite(amplitude)] / max(usual, 1e-9)
+    return float((1 - 2 * np.clip(known, 0.0, 2.0)).sum()) / (2 * max(spread, LEAST_SPREAD) ** 2 * alike)
+
+
+def _waver(values: Float[ndarray, "n"]) -> tuple[float, float, float]:
+    """Median of the amplitudes where a groove is seen, their relative standard deviation, and over how many stations they are
+    alike; no spread where they are too few to tell."""
+    if len(values) < 4 * AROUND:
+        return 1.0, 0.0, 1.0
+    middle, high = np.quantile(values, [0.5, 0.84]).tolist()  # from above: below, what is off is not among them
+    return middle, (high - middle) / middle, _alike(values - middle)
 
 
 def _alike(values: Float[ndarray, "n"]) -> float:
@@ -306,4 +331,6 @@ def track_deviation(track: Track, choice: Choice) -> Float[ndarray, "m"]:
     core = track.core
     weight = track.weight[core]
     sigma = deviation(weight, choice.strength, correlation(np.arange(len(weight)), choice.length)) * np.sqrt(choice.variance)
-    return np.pad(sigma, (core.start, len(track.weight) - core.stop), mode="edge")
+    # Beyond, the line goes straight on, and is wrong in its direction too.
+    before, after = core.start - np.arange(core.start), np.arange(1, len(track.weight) - core.stop + 1)
+    return np.concatenate([sigma[0] * np.hypot(1.0, before / TURN), sigma, sigma[-1] * np.hypot(1.0, after / TURN)])
