@@ -42,7 +42,7 @@ def _end(fit: Fit, last: int, way: int) -> float:
     if edge is not None and step <= (edge - here) * way < LONGEST_DIP:
         # Noise may hide the last of a groove that runs out over the plate's edge.
         stretch = slice(j + 1, round(edge / step) + 1) if way > 0 else slice(max(round(edge / step), 0), j)
-        if np.isfinite(amplitude[stretch]).mean() > 0.5 and fit.track.absence(stretch) < ABSENT:
+        if len(amplitude[stretch]) and np.isfinite(amplitude[stretch]).mean() > 0.5 and fit.track.absence(stretch) < ABSENT:
             return edge
     if 0 <= beyond < len(amplitude) and np.nan_to_num(amplitude[beyond], nan=9.0) <= 0.5 and one_side[beyond]:
         drop = amplitude[j] - amplitude[beyond]

@@ -20,7 +20,9 @@ from weldsim.seam.profile.strength import Choice
 from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
 from weldsim.seam.profile.views import Blocks, agree
 
-EXTEND = 0.025  # [m] how far beyond its known part the groove is looked for, each time
+EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
+LOOK_AHEAD = 0.040  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it
+MOST_LOOKS = 3
 BLOCK = 8  # stations averaged together for the cross-section fit
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
 FEWEST_CELLS = 40  # fewer do not fix a cross-section
@@ -133,20 +135,43 @@ def _settled(
     config: ProfileConfig,
     bridge: float,
 ) -> Fit | None:
-    """The fit after as many more turns as the rail needs to come to rest and to stop growing."""
+    """The fit once the rail has come to rest, and no groove is seen farther ahead."""
+    for _ in range(MOST_LOOKS):
+        measured = _at_rest(measured, points, origins, config, bridge)
+        if measured is None:
+            return None
+        farther = _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, points, origins, config)
+        if farther is None or farther.reach(bridge) <= measured.reach(bridge) + FEWEST_STATIONS:
+            break
+        measured = farther
+    if measured is None:
+        return None
+    measured = _measure(_next_rail(measured, bridge), measured.section, points, origins, config, "settled") or measured
+    return _concluded(measured, bridge)
+
+
+def _at_rest(
+    measured: "Measurement | None",
+    points: Float[ndarray, "n 3"],
+    origins: Float[ndarray, "n 3"] | None,
+    config: ProfileConfig,
+    bridge: float,
+) -> "Measurement | None":
+    """The measurement after as many turns as the rail needs to come to rest and to stop growing; None where it is lost."""
     for _ in range(MOST_TURNS - 1):
         if measured is None:
             return None
         before = measured
-        rail = _advance(before.rail, before.parent, before.section, before.offset, before.track.weight > 0, bridge)
-        measured = _measure(rail, before.section, points, origins, config)
+        measured = _measure(_next_rail(before, bridge), before.section, points, origins, config)
         if measured is not None and measured.moved < SETTLED and measured.reach(bridge) <= before.reach(bridge) + 2:
             break
-    if measured is None:
-        return None
-    rail = _advance(measured.rail, measured.parent, measured.section, measured.offset, measured.track.weight > 0, bridge)
-    measured = _measure(rail, measured.section, points, origins, config, "settled") or measured
-    return _concluded(measured, bridge)
+    return measured
+
+
+def _next_rail(measured: "Measurement", bridge: float, extend: float = EXTEND) -> Rail:
+    """Where the groove was measured, lengthened at both ends by `extend` [m]."""
+    seen = measured.track.weight > 0
+    return _advance(measured.rail, measured.parent, measured.section, measured.offset, seen, bridge, extend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,12 +274,18 @@ def _slope(parent: Parent, offset: Float[ndarray, "m"]) -> Float[ndarray, "m"]:
 
 
 def _advance(
-    rail: Rail, parent: Parent, section: Section, offset: Float[ndarray, "m"], seen: Bool[ndarray, "m"], bridge: float = BRIDGE
+    rail: Rail,
+    parent: Parent,
+    section: Section,
+    offset: Float[ndarray, "m"],
+    seen: Bool[ndarray, "m"],
+    bridge: float = BRIDGE,
+    extend: float = EXTEND,
 ) -> Rail:
-    """The next rail: moved onto the opening where the groove was seen, and lengthened again at both ends."""
+    """The next rail: moved onto the opening where the groove was seen, and lengthened again at both ends by `extend` [m]."""
     core = pieces(seen, rail.step, bridge)[0]
     moved = shift_rail(rail, offset, _opening_height(parent, section, offset), _slope(parent, offset), respace=False)
-    return make_rail(moved.points[core], moved.n[core], rail.step, EXTEND)
+    return make_rail(moved.points[core], moved.n[core], rail.step, extend)
 
 
 def pieces(seen: Bool[ndarray, "m"], step: float, bridge: float = BRIDGE) -> list[slice]:

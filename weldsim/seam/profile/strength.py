@@ -15,6 +15,8 @@ from numpy import ndarray
 from weldsim.seam.profile.smooth import ORDER, end_stiffness
 
 STRENGTHS = 10.0 ** np.arange(-2.0, 10.1, 0.5)  # [stations^6] from hardly any to a parabola
+USUAL = (7.0, 1.5)  # log10 of the strength before anything is seen, and its deviation: seams are straight or bend over 0.1 m and
+# more, and under the noise of a depth camera their third differences are those of strengths of 10^6 to 10^9
 WHITE = 0.1  # of the noise's variance is taken as independent: a Gaussian correlation alone would be too smooth to be true
 FEWEST_BLOCKS = 7  # tell nothing of a strength
 UNDECIDED = 1e5  # the strength then: waves under about 45 stations are noise
@@ -68,6 +70,7 @@ def choose(values: Float[ndarray, "n"], weights: Float[ndarray, "n"], lengths: F
     number = power.shape[1] - np.count_nonzero(~held)
     variance = (power[:, None, :] / relative).sum(axis=2) / number
     likely = -0.5 * (number * np.log(np.maximum(variance, 1e-300)) + np.log(relative).sum(axis=2))
+    likely -= 0.5 * ((np.log10(STRENGTHS) - USUAL[0]) / USUAL[1]) ** 2
     chance = np.exp(likely - likely.max())
     chance /= chance.sum()
     strength = 10.0 ** float(chance.sum(axis=0) @ np.log10(STRENGTHS))
