@@ -100,7 +100,7 @@ class Atlas:
     def within_reach(self, line: Float[ndarray, "k 3"]) -> Int[ndarray, "m"]:
         """Indices of all points, of whatever view, that may lie within SURROUNDINGS of a line (k, 3) [m], and of some more."""
         low, high = line.min(axis=0) - SURROUNDINGS, line.max(axis=0) + SURROUNDINGS
-        return np.flatnonzero(((self.cloud.points > low) & (self.cloud.points < high)).all(axis=1))
+        return np.flatnonzero(_inside(self.cloud.points, low, high))
 
     def sight_origins(self, index: Int[ndarray, "m"]) -> Float[ndarray, "m 3"] | None:
         """Where the cameras stood that saw these points (m, 3) [m], or None where unknown."""
@@ -117,7 +117,7 @@ class Atlas:
         """
         points = self.cloud.points[index]
         low, high = line.min(axis=0) - 1.3 * SURROUNDINGS, line.max(axis=0) + 1.3 * SURROUNDINGS
-        box: Bool[ndarray, "j"] = ((points > low) & (points < high)).all(axis=1)
+        box = _inside(points, low, high)
         index, points = index[box], points[box]
         distance, nearest = KDTree(line).query(points, distance_upper_bound=1.3 * SURROUNDINGS)
         near = np.isfinite(distance)
@@ -231,6 +231,12 @@ def _views_by_stretch(
     best = np.where(covered, score[:, None], -np.inf).argmax(axis=0)
     beside = sight @ sight[best].T > np.cos(CROSSING)
     return np.where(covered.any(axis=0), beside, True)
+
+
+def _inside(points: Float[ndarray, "n 3"], low: Float[ndarray, "3"], high: Float[ndarray, "3"]) -> Bool[ndarray, "n"]:
+    """Which points lie within the box from corner `low` to corner `high` [m]."""
+    x, y, z = ((column > least) & (column < most) for column, least, most in zip(points.T, low, high, strict=True))
+    return x & y & z  # by column: reducing along axis 1 is slow
 
 
 def _union(parts: list[Int[ndarray, "_"]], *, disjoint: bool) -> Int[ndarray, "j"]:

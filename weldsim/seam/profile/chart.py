@@ -17,6 +17,8 @@ from weldsim.records import PointCloud
 
 COARSE_PITCH = 0.0013  # [m] wanted size of a chart cell on the surface
 MAX_CELLS = 1_500_000
+TAIL = 0.0005  # of the points may lie beyond the chart, at each edge
+SAMPLE_STRIDE = 16
 BLOCKS = 128  # along the longer side, in which the density of the points is counted
 FEWEST_BLOCKS = 30
 SPARSE_SHARE = 0.1  # of the blocks are sparser than what counts as sparse
@@ -155,38 +157,42 @@ class Chart:
 
 def make_chart(cloud: PointCloud) -> Chart:
     """The chart of a whole cloud, seen from its (mean) viewpoint or along its thinnest direction."""
-    middle = cloud.points.mean(axis=0)
     if len(cloud.viewpoints) == 1:
         return chart_from(cloud.points, cloud.viewpoints[0])
     if len(cloud.viewpoints):
-        away = middle - cloud.viewpoints.mean(axis=0)
+        away = _middle(cloud.points) - cloud.viewpoints.mean(axis=0)
         return chart_along(cloud.points, unit(away), float(np.linalg.norm(away)))
     return chart_along(cloud.points, -_thin_direction(cloud))
 
 
 def chart_from(points: Float[ndarray, "n 3"], viewpoint: Float[ndarray, "3"]) -> Chart:
     """The chart of points as a camera at `viewpoint` [m] sees them."""
-    axes = _axes(unit(points.mean(axis=0) - viewpoint))
-    local = (points - viewpoint) @ axes.T
-    z = local[:, 2]
+    axes = _axes(unit(_middle(points) - viewpoint))
+    x, y, z = axes @ (points - viewpoint).T
     front = z > 1e-3
     depth0 = float(np.median(z[front])) if front.any() else 1.0
     safe = np.where(front, z, depth0)
-    return _chart(local[:, :2] / safe[:, None], depth0**2 / safe - depth0, front, axes, viewpoint, depth0, perspective=True)
+    return _chart(x / safe, y / safe, depth0**2 / safe - depth0, front, axes, viewpoint, depth0, perspective=True)
 
 
 def chart_along(points: Float[ndarray, "n 3"], forward: Float[ndarray, "3"], distance: float = 1.0) -> Chart:
     """The orthographic chart of points seen along `forward` (3,) unit, from a plane `distance` [m] before their middle."""
     axes = _axes(forward)
-    origin = points.mean(axis=0) - distance * forward
-    local = (points - origin) @ axes.T
-    front = local[:, 2] > 1e-3
-    depth0 = float(np.median(local[front, 2])) if front.any() else 1.0
-    return _chart(local[:, :2], depth0 - local[:, 2], front, axes, origin, depth0, perspective=False)
+    origin = _middle(points) - distance * forward
+    x, y, z = axes @ (points - origin).T
+    front = z > 1e-3
+    depth0 = float(np.median(z[front])) if front.any() else 1.0
+    return _chart(x, y, depth0 - z, front, axes, origin, depth0, perspective=False)
+
+
+def _middle(points: Float[ndarray, "n 3"]) -> Float[ndarray, "3"]:
+    """Mean of the points [m], by column: reducing along axis 0 is slow."""
+    return np.array([column.mean() for column in points.T])
 
 
 def _chart(
-    uv: Float[ndarray, "n 2"],
+    u: Float[ndarray, "n"],
+    v: Float[ndarray, "n"],
     height: Float[ndarray, "n"],
     front: Bool[ndarray, "n"],
     axes: Float[ndarray, "3 3"],
@@ -195,29 +201,30 @@ def _chart(
     *,
     perspective: bool,
 ) -> Chart:
-    """The chart of points at image coordinates `uv` with chart heights [m]; those not in `front` are left out."""
+    """The chart of points at image coordinates (u, v) with chart heights [m]; those not in `front` are left out."""
     scale = depth0 if perspective else 1.0
-    low, high = np.quantile(uv, [0.0005, 0.9995], axis=0)
-    step, sparse = _cell_size(uv, low, high, scale)
+    low, high = np.array([_tails(u, TAIL), _tails(v, TAIL)]).T
+    step, sparse = _cell_size(u, v, low, high, scale)
     corner = low - 2 * step
-    shape = np.ceil((high + 2 * step - corner) / step).astype(int)
-    index = np.floor((uv - corner) / step).astype(np.int64)
-    inside = front & (index >= 0).all(axis=1) & (index < shape).all(axis=1)
-    cell = np.where(inside, index[:, 1] * shape[0] + index[:, 0], -1)
-    size = int(shape[0] * shape[1])
-    count = np.bincount(cell[inside], minlength=size)
-    total = np.bincount(cell[inside], weights=height[inside], minlength=size)
-    image = np.divide(total, count, out=np.zeros(size), where=count > 0).reshape(shape[1], shape[0])
-    valid = (count > 0).reshape(shape[1], shape[0])
+    columns, rows = np.ceil((high + 2 * step - corner) / step).astype(int)
+    u, v = (u - corner[0]) / step, (v - corner[1]) / step
+    column, row = np.floor(u), np.floor(v)
+    inside = front & (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    cell = np.where(inside, row * columns + column, -1.0).astype(np.int64)
+    shape, size = (int(rows), int(columns)), int(rows * columns)
+
+    def summed(values: Float[ndarray, "n"] | None = None) -> Float[ndarray, "h w"]:
+        """Over the points of each cell; their number without values."""
+        return np.bincount(cell + 1, weights=values, minlength=size + 1)[1:].reshape(shape).astype(float)
+
+    count, total = summed(), summed(height)
+    image = np.divide(total, count, out=np.zeros(shape), where=count > 0)
+    valid = count > 0
     scattered = None
     if sparse > SPARSE * step:
-        u, v = ((uv - corner) / step - index - 0.5)[inside].T
-        h = height[inside]
-        sums = [
-            np.bincount(cell[inside], weights=a, minlength=size).reshape(image.shape)
-            for a in (u, v, u * u, v * v, u * v, u * h, v * h)
-        ]
-        scattered = Scattered(count.reshape(image.shape).astype(float), total.reshape(image.shape), sums[0], sums[1], sparse / step)
+        u, v = u - column - 0.5, v - row - 0.5
+        sums = [summed(a) for a in (u, v, u * u, v * v, u * v, u * height, v * height)]
+        scattered = Scattered(count, total, sums[0], sums[1], sparse / step)
         image, valid = scattered.heights(np.stack(sums[2:]))
     else:
         image, valid = _fill_pinholes(image, valid)
@@ -249,7 +256,28 @@ def _axes(forward: Float[ndarray, "3"]) -> Float[ndarray, "3 3"]:
     return np.stack([np.cross(v, forward), v, forward])
 
 
-def _cell_size(uv: Float[ndarray, "n 2"], low: Float[ndarray, "2"], high: Float[ndarray, "2"], scale: float) -> tuple[float, float]:
+def _tails(values: Float[ndarray, "n"], share: float) -> tuple[float, float]:
+    """The quantiles `share` and 1 - `share`, exactly; sought only among the values beyond wider ones of a sample."""
+    sample = np.sort(values[::SAMPLE_STRIDE])
+    wide = int(4 * share * len(sample))
+    below, above = values[values <= sample[wide]], values[values >= sample[-1 - wide]]
+    if min(len(below), len(above)) < share * len(values) + 2:  # a sample that is not like the rest, or all of a few
+        low, high = np.quantile(values, [share, 1 - share])
+        return float(low), float(high)
+    place = share * (len(values) - 1)
+    return _ranked(below, place), -_ranked(-above, place)
+
+
+def _ranked(values: Float[ndarray, "k"], place: float) -> float:
+    """The value at a place in the order of size, from 0, between the two about it where it is no whole number."""
+    first = int(place)
+    one, other = np.sort(np.partition(values, first + 1)[: first + 2])[-2:]
+    return float(one + (place - first) * (other - one))
+
+
+def _cell_size(
+    u: Float[ndarray, "n"], v: Float[ndarray, "n"], low: Float[ndarray, "2"], high: Float[ndarray, "2"], scale: float
+) -> tuple[float, float]:
     """Cell size, COARSE_PITCH or coarser where the cloud is sparser, and the spacing of points where they are sparse, both
     in units of uv.
 
@@ -258,10 +286,11 @@ def _cell_size(uv: Float[ndarray, "n 2"], low: Float[ndarray, "2"], high: Float[
     """
     extent = np.maximum(high - low, 1e-9)
     block = max(float(extent.max()) / BLOCKS, 1e-12)
-    at = np.clip(np.floor((uv - low) / block).astype(np.int64), -1, BLOCKS) + 1
-    count = np.bincount(at[:, 0] * (BLOCKS + 2) + at[:, 1], minlength=(BLOCKS + 2) ** 2).reshape(BLOCKS + 2, BLOCKS + 2)
+    at_u, at_v = (np.clip(np.floor((at - least) / block), -1, BLOCKS) + 1 for at, least in zip((u, v), low, strict=True))
+    at = (at_u * (BLOCKS + 2) + at_v).astype(np.int64)
+    count = np.bincount(at, minlength=(BLOCKS + 2) ** 2).reshape(BLOCKS + 2, BLOCKS + 2)
     within = cv2.erode((count > 0).astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
-    spacing = sparse = block * float(np.sqrt(np.count_nonzero(count) / len(uv)))
+    spacing = sparse = block * float(np.sqrt(np.count_nonzero(count) / len(u)))
     if np.count_nonzero(within) >= FEWEST_BLOCKS:
         usual, low_count = np.quantile(count[within], [0.5, SPARSE_SHARE])
         spacing, sparse = block / float(np.sqrt(usual)), block / float(np.sqrt(low_count))

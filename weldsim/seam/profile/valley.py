@@ -58,8 +58,8 @@ def valley_images(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> l
     """
     slope = _local_slope(chart)
     images = []
-    for mode in _slope_modes(slope[chart.valid][::3]):
-        within = chart.valid & (np.abs(slope - mode).max(axis=-1) < MODE_REACH)
+    for mode in _slope_modes(slope.reshape(-1, 2)[np.flatnonzero(chart.valid)[::3]]):
+        within = chart.valid & _alike(slope, mode)
         # A table far behind the part must not decide what a millimetre is: a groove would seem wider than it is.
         usual = chart.depth0**2 / (chart.depth0 + float(np.median(chart.height[within]))) if within.any() else chart.depth0
         ratio = usual / chart.depth0
@@ -142,24 +142,35 @@ def _local_slope(chart: Chart) -> Float[ndarray, "h w 2"]:
 
 def _slope_modes(slopes: Float[ndarray, "n 2"]) -> list[Float[ndarray, "2"]]:
     """The slopes that a share of at least MODE_SHARE of the cells have, the commonest first, at most MOST_MODES."""
-    known = slopes[np.isfinite(slopes).all(axis=1)]
+    known = slopes[np.isfinite(slopes[:, 0]) & np.isfinite(slopes[:, 1])]
     if len(known) == 0:
         return [np.zeros(2)]
     modes: list[Float[ndarray, "2"]] = []
     left = known
     while len(modes) < MOST_MODES and len(left) >= MODE_SHARE * len(known):
         bins = np.floor(left / (MODE_REACH / 2)).astype(np.int64)
-        _, which, count = np.unique(bins, axis=0, return_inverse=True, return_counts=True)
-        centre = np.median(left[which.ravel() == count.argmax()], axis=0)
-        near = np.abs(left - centre).max(axis=1) < MODE_REACH
+        bins -= bins.min(axis=0)
+        keys = bins[:, 0] * (int(bins[:, 1].max()) + 1) + bins[:, 1]
+        _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
+        centre = _median(left[which == count.argmax()])
+        near = _alike(left, centre)
         if near.any():
-            centre = np.median(left[near], axis=0)
-            near = np.abs(left - centre).max(axis=1) < MODE_REACH
+            centre = _median(left[near])
+            near = _alike(left, centre)
         if modes and np.count_nonzero(near) < MODE_SHARE * len(known):
             break
         modes.append(centre)
-        left = left[np.abs(left - centre).max(axis=1) >= MODE_REACH]
+        left = left[~_alike(left, centre)]
     return modes
+
+
+def _alike(slopes: Float[ndarray, "*n 2"], mode: Float[ndarray, "2"]) -> Bool[ndarray, "*n"]:
+    """Which slopes belong to a mode."""
+    return (np.abs(slopes[..., 0] - mode[0]) < MODE_REACH) & (np.abs(slopes[..., 1] - mode[1]) < MODE_REACH)
+
+
+def _median(slopes: Float[ndarray, "n 2"]) -> Float[ndarray, "2"]:
+    return np.array([np.median(column) for column in slopes.T])  # by column: along axis 0 it is slow
 
 
 @dataclass(frozen=True, eq=False)
