@@ -100,57 +100,29 @@ def lay_out(rail: Rail, points: Float[ndarray, "k 3"], origins: Float[ndarray, "
     Args:
         points: (k, 3) [m].  origins: (k, 3) where the camera that saw each point stood, or None.
     """
+    from weldsim.seam.profile import native
+
+    points = np.ascontiguousarray(points)
     station = _nearest(rail, points)
-    base = np.take(rail.points, station, axis=0)
-    t = np.take(rail.t, station, axis=0)
-    along = _dot(points - base, t)
-    # Axes between stations: without this, a curved rail's points jump by curvature * x * half a step.
-    other = np.clip(station + np.where(along > 0, 1, -1), 0, len(rail) - 1)
-    u = np.clip(np.abs(along) / rail.step, 0.0, 1.0)[:, None]
-    e, n, base = (_between(axis, station, other, u) for axis in (rail.e, rail.n, rail.points))
-    offset = points - base
-    x, h = _dot(offset, e), _dot(offset, n)
-    s = station * rail.step + along
-    if origins is None:
-        return Strip(station, s, x, h, np.zeros((len(points), 2)), np.full(len(points), np.inf))
-    sight = unit(points - origins)
-    inward = np.maximum(-_dot(sight, n), 0.2)
-    slope = np.stack([_dot(sight, t), _dot(sight, e)], axis=1) / inward[:, None]
-    return Strip(station, s, x, h, slope, _dot(origins - base, n))
-
-
-def _dot(a: Float[ndarray, "k 3"], b: Float[ndarray, "k 3"]) -> Float[ndarray, "k"]:
-    return np.einsum("ij,ij->i", a, b)
-
-
-def _between(
-    axes: Float[ndarray, "m 3"], one: Int[ndarray, "k"], other: Int[ndarray, "k"], u: Float[ndarray, "k 1"]
-) -> Float[ndarray, "k 3"]:
-    """What lies the part u of the way from one station to the other."""
-    return np.take(axes, one, axis=0) * (1 - u) + np.take(axes, other, axis=0) * u
+    k = len(points)
+    s, x, h, slope, above = np.empty(k), np.empty(k), np.empty(k), np.zeros((k, 2)), np.full(k, np.inf)
+    seen = np.empty((0, 3)) if origins is None else np.ascontiguousarray(origins)
+    native.coordinates(points, seen, station, rail.points, rail.t, rail.e, rail.n, rail.step, s, x, h, slope, above)
+    return Strip(station, s, x, h, slope, above)
 
 
 def _nearest(rail: Rail, points: Float[ndarray, "k 3"]) -> Int[ndarray, "k"]:
     """Nearest station of each point.
 
     A rail that never turns back on its chord gives a guess at once, and a few steps along its tangents the answer; any
-    other rail, and points that have not settled, ask a KD-tree.
+    other rail asks a KD-tree.
     """
-    last = len(rail) - 1
+    from weldsim.seam.profile import native
+
     chord = unit(rail.points[-1] - rail.points[0])
     place = (rail.points - rail.points[0]) @ chord
     if not (np.diff(place) > 0.3 * rail.step).all():
         return np.asarray(KDTree(rail.points).query(points)[1], dtype=np.int64)
-    guess = np.interp((points - rail.points[0]) @ chord, place, np.arange(last + 1))
-    station = np.rint(guess).astype(np.int64)
-    move = np.zeros(len(points), dtype=np.int64)
-    for _ in range(4):
-        along = _dot(points - np.take(rail.points, station, axis=0), np.take(rail.t, station, axis=0))
-        moved = np.clip(station + np.rint(along / rail.step).astype(np.int64), 0, last)
-        move, station = moved - station, moved
-        if not move.any():
-            return station
-    wild = np.flatnonzero(np.abs(move) > 1)
-    if len(wild):
-        station[wild] = KDTree(rail.points).query(points[wild])[1]
+    station = np.empty(len(points), np.int64)
+    native.stations_by_chord(points, rail.points, rail.t, chord, place, rail.step, station)
     return station

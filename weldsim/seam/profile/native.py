@@ -1,0 +1,105 @@
+"""The loop over points that a rail is laid through, compiled by numba on first use and cached.
+
+Import this module inside functions only: it brings numba in, which takes longer than the loop saves a short-lived process.
+"""
+
+from typing import no_type_check
+
+import numba
+import numpy as np
+
+_jit = numba.njit(cache=True, nogil=True, error_model="numpy")
+STEPS = 4  # along the tangents, after which a point that still moves is looked for among all stations
+
+
+@_jit
+@no_type_check
+def nearest_station(x, y, z, station, places, tangents, step):
+    """The station nearest to a point, walking along the tangents from a guess."""
+    last = len(places) - 1
+    move = 0
+    for _ in range(STEPS):
+        along = (
+            (x - places[station, 0]) * tangents[station, 0]
+            + (y - places[station, 1]) * tangents[station, 1]
+            + (z - places[station, 2]) * tangents[station, 2]
+        )
+        moved = min(max(station + int(np.rint(along / step)), 0), last)
+        move, station = moved - station, moved
+        if move == 0:
+            return station
+    if abs(move) > 1:
+        least = np.inf
+        for k in range(last + 1):
+            dx, dy, dz = x - places[k, 0], y - places[k, 1], z - places[k, 2]
+            distance = dx * dx + dy * dy + dz * dz
+            if distance < least:
+                least, station = distance, k
+    return station
+
+
+@_jit
+@no_type_check
+def stations_by_chord(points, places, tangents, chord, along_chord, step, out):
+    """The nearest station of each point of a rail that never turns back on its chord.
+
+    Args:
+        points: (k, 3).  places, tangents: (m, 3) of the stations.  chord: (3,) unit; along_chord: (m,) of each station, increasing.
+        out: (k,) stations.
+    """
+    last = len(places) - 1
+    density = last / (along_chord[last] - along_chord[0])
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        at = (x - places[0, 0]) * chord[0] + (y - places[0, 1]) * chord[1] + (z - places[0, 2]) * chord[2]
+        if at <= along_chord[0]:
+            guess = 0
+        elif at >= along_chord[last]:
+            guess = last
+        else:
+            low = min(int((at - along_chord[0]) * density), last - 1)
+            while along_chord[low] > at:
+                low -= 1
+            while along_chord[low + 1] <= at:
+                low += 1
+            guess = int(np.rint(low + (at - along_chord[low]) / (along_chord[low + 1] - along_chord[low])))
+        out[i] = nearest_station(x, y, z, guess, places, tangents, step)
+
+
+@_jit
+@no_type_check
+def coordinates(points, origins, station, places, t, e, n, step, s, x, h, slope, above):
+    """Every point in a rail's coordinates, written into `s` to `above`; see `weldsim.seam.profile.rail.Strip`.
+
+    Axes are interpolated between stations: without this, a curved rail's points jump by curvature * x * half a step.
+
+    Args:
+        origins: (k, 3) where the camera that saw each point stood, or (0, 3) where unknown.
+    """
+    last = len(places) - 1
+    seen = len(origins) > 0
+    for i in range(len(points)):
+        j = station[i]
+        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
+        tx, ty, tz = t[j, 0], t[j, 1], t[j, 2]
+        along = (px - places[j, 0]) * tx + (py - places[j, 1]) * ty + (pz - places[j, 2]) * tz
+        k = min(j + 1, last) if along > 0 else max(j - 1, 0)
+        u = min(abs(along) / step, 1.0)
+        w = 1.0 - u
+        bx, by, bz = places[j, 0] * w + places[k, 0] * u, places[j, 1] * w + places[k, 1] * u, places[j, 2] * w + places[k, 2] * u
+        ex, ey, ez = e[j, 0] * w + e[k, 0] * u, e[j, 1] * w + e[k, 1] * u, e[j, 2] * w + e[k, 2] * u
+        nx, ny, nz = n[j, 0] * w + n[k, 0] * u, n[j, 1] * w + n[k, 1] * u, n[j, 2] * w + n[k, 2] * u
+        ox, oy, oz = px - bx, py - by, pz - bz
+        s[i] = j * step + along
+        x[i] = ox * ex + oy * ey + oz * ez
+        h[i] = ox * nx + oy * ny + oz * nz
+        if seen:
+            cx, cy, cz = origins[i, 0], origins[i, 1], origins[i, 2]
+            dx, dy, dz = px - cx, py - cy, pz - cz
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            if length > 0:
+                dx, dy, dz = dx / length, dy / length, dz / length
+            inward = max(-(dx * nx + dy * ny + dz * nz), 0.2)
+            slope[i, 0] = (dx * tx + dy * ty + dz * tz) / inward
+            slope[i, 1] = (dx * ex + dy * ey + dz * ez) / inward
+            above[i] = (cx - bx) * nx + (cy - by) * ny + (cz - bz) * nz
