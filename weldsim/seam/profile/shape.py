@@ -80,7 +80,7 @@ def predict(
     by_ramp = _sums(np.concatenate([turn[None], changed]), ramp)
     depth = d.reshape(BLUR + 1, s, *d.shape[1:])[0, ..., :1] + by_ramp[0]
     jacobian = np.empty((s, 7, *depth.shape[1:]))
-    jacobian[:, :BLUR] = np.moveaxis(by_ramp[1:] + _sums(moved, slope), 0, 1)
+    jacobian[:, :BLUR] = (by_ramp[1:] + _sums(moved, slope)).transpose(1, 0, 2, 3)
     jacobian[:, BLUR] = _sums(turn[None], widening)[0] * stretch[:, None] * UNIT[BLUR]
     jacobian[:, TAPER] = _sums(turn[None], tapering)[0] * UNIT[TAPER]
     return depth, jacobian
@@ -88,7 +88,7 @@ def predict(
 
 def _sums(factors: Float[ndarray, "p s g 4"], each: Float[ndarray, "s g 4 w"]) -> Float[ndarray, "p s g w"]:
     """The corners' curves summed with each set of factors."""
-    return np.moveaxis(np.moveaxis(factors, 0, 2) @ each, 2, 0)
+    return (factors.transpose(1, 2, 0, 3) @ each).transpose(2, 0, 1, 3)
 
 
 def _corners(theta: Float[ndarray, "s 7"], step: float) -> Float[ndarray, "s 6"]:
