@@ -111,18 +111,41 @@ def test_what_is_written_is_read_back(tmp_path):
     assert [place.name for place in tmp_path.iterdir()] == ["golden.json"]
 
 
+def test_the_published_method_is_recorded_as_a_distribution_and_ours_by_seed(tmp_path):
+    theirs = updated(GOLDEN, [replace(GOOD, method="thesis", seed=seed) for seed in range(3)], "why")
+    assert {entry.judge for entry in theirs.entries("made", "thesis").values()} == {"distribution"}
+    assert {entry.judge for entry in theirs.entries("made", "profile").values()} == {"seed"}
+    assert read_golden(write_golden(tmp_path / "golden.json", theirs)) == theirs
+    assert compare(replace(GOOD, method="thesis", mean=1.0), theirs.entries("made", "thesis")) == ()
+
+
+def test_a_figure_judged_in_another_way_than_before_is_recorded_anew():
+    rows = [replace(GOOD, method="thesis")]
+    once = updated(Golden(), rows, "why").entries("made", "thesis")["mean"]
+    before = Golden(scenes={"made": {"thesis": {"mean": replace(once, judge="seed", tolerance=2e-3, reason="old")}}})
+    again = updated(before, rows, "judged over seeds").entries("made", "thesis")["mean"]
+    assert (again.judge, again.tolerance, again.reason) == ("distribution", FIGURES["mean"].tolerance, "judged over seeds")
+
+
+def test_files_of_the_first_schema_are_judged_by_seed(tmp_path):
+    text = broken("schema", value="weldsim.golden/1")
+    (tmp_path / "golden.json").write_text(text)
+    assert read_golden(tmp_path / "golden.json").entries("made", "profile")["mean"].judge == "seed"
+
+
 def test_the_golden_file_of_weldsim_is_whole():
     golden = read_golden(default_golden())
     assert golden.scenes
     for methods in golden.scenes.values():
         for entries in methods.values():
             assert {"missed", "phantoms", "phantom_length"} <= set(entries)
+            assert not [name for name, entry in entries.items() if "not looked into" in entry.reason]
 
 
 def broken(*path: str, value: object) -> str:
     """The text of GOLDEN with one place replaced."""
     entry = {"values": [1.0], "tolerance": 0.1, "reason": "why"}
-    data = {"schema": "weldsim.golden/1", "scenes": {"made": {"profile": {"mean": entry}}}}
+    data = {"schema": "weldsim.golden/2", "scenes": {"made": {"profile": {"mean": entry}}}}
     place = data
     for key in path[:-1]:
         place = place[key]
@@ -141,7 +164,7 @@ MEAN = ("scenes", "made", "profile", "mean")
         "[]",
         "null",
         '{"schema": "weldsim.golden/1"}',
-        broken("schema", value="weldsim.golden/2"),
+        broken("schema", value="weldsim.golden/3"),
         broken("scenes", value=[]),
         broken("scenes", "made", value=3),
         broken("scenes", "made", "profile", value="x"),
@@ -155,6 +178,8 @@ MEAN = ("scenes", "made", "profile", "mean")
         broken(*MEAN, "tolerance", value="much"),
         broken(*MEAN, "reason", value=" "),
         broken(*MEAN, "reason", value=None),
+        broken(*MEAN, "judge", value="mean"),
+        broken(*MEAN, "judge", value=["seed"]),
         "[" * 100_000,
     ],
 )

@@ -18,6 +18,7 @@ from weldsim.config import CellConfig
 from weldsim.errors import InputError
 from weldsim.records import PointCloud, SeamFindings
 from weldsim.regression import Golden, Regression, default_golden, read_golden, regress, updated, write_golden
+from weldsim.regression.golden import Entry
 from weldsim.regression.recorded import figures_of_cloud, read_known_seam
 from weldsim.seam.find import find_seams
 
@@ -116,6 +117,36 @@ def test_the_command_passes_on_the_recorded_figures_and_fails_when_one_is_tighte
     config = json.loads((tmp_path / "runs/regress/straight-profile-0/config.json").read_text())
     assert config["seed"] == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.html", "out.xml", "runs", "tight.json"]
+
+
+def test_the_published_method_is_judged_over_its_seeds(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["regress", "--scenes", "plain", "--methods", "thesis", "--golden", "golden.json", "--jobs", "1"]
+
+    def entry(values: list[float]) -> Entry:
+        return Entry(values=tuple(values), tolerance=0.0, reason="for a test", judge="distribution")
+
+    alike = {"missed": entry([0.0] * 40), "phantoms": entry([float(k % 12) for k in range(40)])}
+    write_golden("golden.json", Golden(scenes={"plain": {"thesis": alike}}))
+    assert main([*words, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert [row["judged"] for row in said["rows"]] == [True] * 3
+    assert said["over_all_seeds"] == {"false_alarm_rate": 0.01, "tests": 2, "worse": []}
+
+    write_golden("golden.json", Golden(scenes={"plain": {"thesis": alike | {"phantoms": entry([0.0] * 40)}}}))
+    assert main([*words, "--junit", "out.xml", "--html", "out.html"]) == 1
+    out = capsys.readouterr().out
+    assert "WORSE plain, thesis, 3 seeds: phantom seams median" in out
+    assert "1 figure is worse than golden.json allows" in out
+    suites = {suite.get("name"): suite for suite in ElementTree.parse("out.xml").getroot()}
+    assert [suites[name].get("failures") for name in ("plain", "all seeds together")] == ["0", "1"]
+    failure = suites["all seeds together"].find("testcase/failure")
+    assert failure is not None
+    assert "phantom seams" in (failure.get("message") or "")
+    assert "phantom seams median" in Path("out.html").read_text()
+
+    assert main([*words, "--seeds", "1"]) == 0
+    assert "thesis: too few seeds to tell worse from chance" in capsys.readouterr().out
 
 
 def check_junit(path: Path) -> None:

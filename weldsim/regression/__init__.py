@@ -10,6 +10,7 @@ A finder is a function from `PointCloud` to `SeamFindings`; with `jobs` above 1 
 A recorded cloud with a line that is known to be its seam is judged by the same definitions: see `weldsim.regression.recorded`.
 """
 
+from weldsim.regression.distribution import Judgement, Shift, judge
 from weldsim.regression.figures import FIGURES, Figure, Figures, figures_of
 from weldsim.regression.golden import Deviation, Golden, compare, default_golden, read_golden, updated, write_golden
 from weldsim.regression.suite import Regression, Row, regress
@@ -20,11 +21,14 @@ __all__ = [
     "Figure",
     "Figures",
     "Golden",
+    "Judgement",
     "Regression",
     "Row",
+    "Shift",
     "compare",
     "default_golden",
     "figures_of",
+    "judge",
     "read_golden",
     "regress",
     "updated",

@@ -1,7 +1,9 @@
 """Golden figures: what every scene and method came to when it was last accepted, with tolerance and reason beside each.
 
-A file of schema `weldsim.golden/1`: scenes, then methods, then figures; of each figure the value for each seed from 0
-(SI units; null where there was none), the tolerance by which it may be worse (null = never judged), and why it is as it is.
+A file of schema `weldsim.golden/2`: scenes, then methods, then figures; of each figure the value for each seed from 0
+(SI units; null where there was none), the tolerance by which it may be worse (null = never judged), how it is judged ("seed":
+each against the same seed's; "distribution": all seeds as one sample, see `weldsim.regression.distribution`), and why it is
+as it is. In files of `weldsim.golden/1` every figure is judged by seed.
 """
 
 import json
@@ -13,19 +15,26 @@ from typing import Any
 from weldsim import __version__
 from weldsim.errors import InputError
 from weldsim.output import write_whole
-from weldsim.regression.figures import FIGURES, Figures, tolerance_of
+from weldsim.regression.figures import FIGURES, Figures, Judge, judge_of
 
-SCHEMA = "weldsim.golden/1"
+SCHEMA = "weldsim.golden/2"
+READABLE = ("weldsim.golden/1", SCHEMA)
+JUDGES: tuple[Judge, ...] = ("seed", "distribution")
 DIGITS = 7  # decimals kept: 0.1 um
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """One figure of one scene and method. Attributes: values, one a seed from 0; tolerance; reason."""
+    """One figure of one scene and method. Attributes: values, one a seed from 0; tolerance; reason; judge: as what."""
 
     values: tuple[float | None, ...]
     tolerance: float | None
     reason: str
+    judge: Judge = "seed"
+
+    def judges(self, seed: int) -> bool:
+        """Whether this seed's figure is held against its own record."""
+        return self.judge == "seed" and self.tolerance is not None and seed < len(self.values)
 
 
 Entries = dict[str, Entry]
@@ -89,7 +98,7 @@ def read_golden(path: Path | str) -> Golden:
         raise InputError(f"{path}: cannot be read ({error.strerror})", path=str(path)) from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: no golden file: not JSON ({error})", path=str(path)) from None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA or not isinstance(data.get("scenes"), dict):
+    if not isinstance(data, dict) or data.get("schema") not in READABLE or not isinstance(data.get("scenes"), dict):
         raise InputError(f"{path}: no golden file: wants schema {SCHEMA!r} and a table 'scenes'", path=str(path))
     scenes: dict[str, dict[str, Entries]] = {}
     for scene, methods in data["scenes"].items():
@@ -113,7 +122,7 @@ def write_golden(path: Path | str, golden: Golden) -> Path:
 
 def _method_text(method: str, entries: Entries) -> str:
     rows = [
-        f"    {_text(name)}: {_text({'values': list(e.values), 'tolerance': e.tolerance, 'reason': e.reason})}"
+        f"    {_text(name)}: {_text({'values': list(e.values), 'tolerance': e.tolerance, 'judge': e.judge, 'reason': e.reason})}"
         for name, e in entries.items()
     ]
     return f"   {_text(method)}: {{\n" + ",\n".join(rows) + "\n   }"
@@ -124,14 +133,15 @@ def _text(value: Any) -> str:
 
 
 def compare(figures: Figures, entries: Entries) -> tuple[Deviation, ...]:
-    """The figures that are worse than recorded by more than their tolerance.
+    """The figures of one seed that are worse than recorded by more than their tolerance.
 
-    A figure without an entry, one recorded as null, or a seed beyond those recorded is not judged; better never fails.
+    A figure without an entry, one recorded as null or as a distribution, or a seed beyond those recorded is not judged; better
+    never fails.
     """
     out = []
     for name, value in figures.judged().items():
         entry = entries.get(name)
-        if entry is None or entry.tolerance is None or figures.seed >= len(entry.values):
+        if entry is None or entry.tolerance is None or not entry.judges(figures.seed):
             continue
         golden = entry.values[figures.seed]
         if golden is None:
@@ -147,7 +157,8 @@ def compare(figures: Figures, entries: Entries) -> tuple[Deviation, ...]:
 
 
 def updated(golden: Golden, rows: Iterable[Figures], reason: str) -> Golden:
-    """The golden figures with those of `rows` in their place: tolerances are kept, and reasons too where nothing changed.
+    """The golden figures with those of `rows` in their place: tolerances are kept, and reasons too where nothing changed, except
+    where a figure is judged in another way than before.
 
     A scene that could not be scanned stays as it was: that nothing was seen is not accepted as a figure.
 
@@ -181,12 +192,12 @@ def _renewed(name: str, method: str, values: list[float | None], before: Entry |
     rounded = tuple(None if value is None else round(float(value), DIGITS) for value in values)
     if FIGURES[name].kind == "time":  # the machine's mood is no change
         rounded = tuple(None if value is None else round(value, 2) for value in rounded)
-        if before is not None and len(before.values) == len(rounded):
+        if before is not None and before.judge == judge_of(method) and len(before.values) == len(rounded):
             old = before.values
             if all(a is not None and b is not None and b / 2 <= a <= 2 * b for a, b in zip(rounded, old, strict=True)):
                 return before
-    if before is None:
-        return Entry(values=rounded, tolerance=tolerance_of(name, method), reason=reason.strip())
+    if before is None or before.judge != judge_of(method):
+        return Entry(values=rounded, tolerance=FIGURES[name].tolerance, reason=reason.strip(), judge=judge_of(method))
     if before.values == rounded:
         return before
     return replace(before, values=rounded, reason=reason.strip())
@@ -201,14 +212,16 @@ def _table(value: Any, where: str) -> dict[str, Any]:
 def _entry(name: str, data: dict[str, Any], where: str) -> Entry:
     if name not in FIGURES:
         raise InputError(f"{where}: unknown figure; known are {', '.join(FIGURES)}", where=where, allowed=list(FIGURES))
-    values, tolerance, reason = data.get("values"), data.get("tolerance"), data.get("reason")
+    values, tolerance, reason, judge = data.get("values"), data.get("tolerance"), data.get("reason"), data.get("judge", "seed")
     if not isinstance(values, list) or not values or not all(value is None or _is_number(value) for value in values):
         raise InputError(f"{where}: 'values' must be a list of numbers or null, one a seed", where=where)
     if tolerance is not None and not (_is_number(tolerance) and tolerance >= 0):
         raise InputError(f"{where}: 'tolerance' must be a number of 0 or more, or null", where=where)
     if not isinstance(reason, str) or not reason.strip():
         raise InputError(f"{where}: 'reason' must say why the figure is as it is", where=where)
-    return Entry(values=tuple(values), tolerance=tolerance, reason=reason)
+    if judge not in JUDGES:
+        raise InputError(f"{where}: 'judge' must be one of {', '.join(JUDGES)}", where=where, allowed=list(JUDGES))
+    return Entry(values=tuple(values), tolerance=tolerance, reason=reason, judge=judge)
 
 
 def _is_number(value: Any) -> bool:

@@ -60,7 +60,8 @@ class Row:
     """What one scene, method and seed came to.
 
     Attributes:
-        figures: measured.  deviations: those that are worse than they may be; judged: whether there was anything to judge by.
+        figures: measured.  deviations: those that are worse than they may be; judged: whether there was anything to judge by,
+            this seed or, where the record is a distribution, all seeds of the run.
         folder: run directory left behind, or None.  picture: JPEG bytes, or None.
         scan_seconds: building and scanning, shared by all methods of the scene and seed.
     """
@@ -130,7 +131,7 @@ def _planned(task: Task, method: str, seen: Sighting) -> Row:
         write_run(folder, done, config, task.scene, task.seed, seen.sensor)
     if task.pictures:
         picture = _picture(done)
-    judged = any(entry.tolerance is not None and task.seed < len(entry.values) for entry in entries.values())
+    judged = any(entry.judges(task.seed) for entry in entries.values())
     return Row(
         figures=figures, deviations=deviations, judged=judged, folder=None if folder is None else str(folder), picture=picture
     )
@@ -171,7 +172,8 @@ def _unseen(task: Task, method: str, error: WeldsimError) -> Row:
         write_whole(folder / "config.json", json.dumps(resolved, indent=2) + "\n")
         said = {"schema": SCHEMA, "scene": task.scene.name, "seed": task.seed, "method": method, "refused": str(error)}
         write_whole(folder / MANIFEST, json.dumps(said, indent=2) + "\n")
-    return Row(figures=figures, deviations=deviations, judged=bool(entries), folder=None if folder is None else str(folder))
+    judged = any(entry.judges(task.seed) for entry in entries.values())
+    return Row(figures=figures, deviations=deviations, judged=judged, folder=None if folder is None else str(folder))
 
 
 def _picture(done: RunResult) -> bytes:

@@ -1,4 +1,7 @@
-"""JUnit XML, as continuous-integration systems read it: a suite a scene, a case a method and seed."""
+"""JUnit XML, as continuous-integration systems read it: a suite a scene, a case a method and seed.
+
+Methods whose record is a distribution have one more suite, with a case for each: what their seeds together came to.
+"""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -7,7 +10,7 @@ from weldsim.output import write_whole
 from weldsim.regression.golden import Deviation
 from weldsim.regression.job import Row
 from weldsim.regression.suite import Regression
-from weldsim.regression.text import number, sentence
+from weldsim.regression.text import number, sentence, shift_sentence
 
 
 def junit_xml(outcome: Regression) -> str:
@@ -15,12 +18,26 @@ def junit_xml(outcome: Regression) -> str:
 
     A case without golden figures is skipped, saying so. Times are those of scan and plan together [s].
     """
-    root = ElementTree.Element("testsuites", {"name": "weldsim regress", **_counts(list(outcome.rows))})
+    together = sorted({method for _, method in outcome.judgement.judged})
+    worse = {method: [shift_sentence(shift) for shift in outcome.shifts if shift.method == method] for method in together}
+    counts = _counts(list(outcome.rows))
+    counts["tests"] = str(len(outcome.rows) + len(together))
+    counts["failures"] = str(int(counts["failures"]) + sum(map(bool, worse.values())))
+    root = ElementTree.Element("testsuites", {"name": "weldsim regress", **counts})
     for scene in outcome.scenes:
         rows = [row for row in outcome.rows if row.figures.scene == scene]
         suite = ElementTree.SubElement(root, "testsuite", {"name": scene, **_counts(rows)})
         for row in rows:
             _case(suite, row)
+    if together:
+        counts = {"tests": str(len(together)), "failures": str(sum(map(bool, worse.values()))), "errors": "0", "skipped": "0"}
+        suite = ElementTree.SubElement(root, "testsuite", {"name": "all seeds together", **counts, "time": "0.000"})
+        for method, said in worse.items():
+            case = ElementTree.SubElement(suite, "testcase", classname=f"together.{method}", name="all seeds", time="0.000")
+            if said:
+                message = said[0] + (f" (and {len(said) - 1} more)" if len(said) > 1 else "")
+                failure = ElementTree.SubElement(case, "failure", message=_clean(message), type="WorseThanGolden")
+                failure.text = _clean("\n".join(said))
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

@@ -9,7 +9,7 @@ from weldsim.output import write_whole
 from weldsim.regression.figures import FIGURES
 from weldsim.regression.job import Row
 from weldsim.regression.suite import Regression
-from weldsim.regression.text import HEAD, number, rows_of_text, sentence
+from weldsim.regression.text import HEAD, number, rows_of_text, sentence, shift_sentence, unjudged
 from weldsim.report.html import STYLE
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
@@ -22,13 +22,13 @@ td,th{white-space:nowrap}td.why{white-space:normal;color:var(--soft)}
 
 def page(outcome: Regression) -> str:
     """The HTML text; it asks nothing of any network."""
-    failed = len(outcome.deviations)
-    word, look = ("WORSE", "bad") if failed else ("NOT WORSE", "good")
+    word, look = ("NOT WORSE", "good") if outcome.passed else ("WORSE", "bad")
     facts = (
         f"{len(outcome.scenes)} scenes, {len(outcome.methods)} methods, {outcome.seeds} seeds, {outcome.jobs} processes,"
         f" {outcome.seconds:.0f} s; weldsim {__version__}"
     )
-    listed = "".join(f"<li>{escape(sentence(deviation))}</li>" for deviation in outcome.deviations)
+    said = [*map(sentence, outcome.deviations), *map(shift_sentence, outcome.shifts), *filter(None, [unjudged(outcome)])]
+    listed = "".join(f"<li>{escape(text)}</li>" for text in said)
     body = (
         f"<header><div><h1>Regression against known seams</h1><p>{escape(facts)}</p></div>"
         f'<div class="verdict {look}">{word}</div></header>'

@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from weldsim.config import CellConfig, load_scene
 from weldsim.errors import ExecutionError, InputError
 from weldsim.pipeline import Finder, SensorName
+from weldsim.regression.distribution import Judgement, Shift, judge
 from weldsim.regression.golden import Deviation, Golden
 from weldsim.regression.job import Row, Task, carry_out
 from weldsim.scene.files import scene_names
@@ -37,6 +38,7 @@ class Regression:
     Attributes:
         rows: by scene, then method, then seed, in the order they were asked for.
         scenes, methods: in that order.  seeds, jobs: as asked.  seconds: from start to end [s].
+        judgement: of the figures that are recorded as distributions, over all seeds.
     """
 
     rows: tuple[Row, ...]
@@ -45,16 +47,22 @@ class Regression:
     seeds: int
     jobs: int
     seconds: float
+    judgement: Judgement = field(default_factory=Judgement)
 
     @property
     def deviations(self) -> tuple[Deviation, ...]:
-        """Everything that is worse than it may be."""
+        """Every figure of one seed that is worse than it may be."""
         return tuple(deviation for row in self.rows for deviation in row.deviations)
+
+    @property
+    def shifts(self) -> tuple[Shift, ...]:
+        """Every figure that is worse than it may be over all seeds."""
+        return self.judgement.shifts
 
     @property
     def passed(self) -> bool:
         """Whether nothing is worse than it may be."""
-        return not self.deviations
+        return not self.deviations and not self.shifts
 
     def of(self, scene: str, method: str) -> tuple[Row, ...]:
         """The rows of one scene and method, a seed each."""
@@ -67,6 +75,7 @@ def regress(
     methods: Sequence[Method] = METHODS,
     finders: Mapping[str, Finder] | None = None,
     seeds: int = 3,
+    seeds_of: Mapping[str, int] | None = None,
     jobs: int = 1,
     config: CellConfig | None = None,
     sensor: SensorName = "d415",
@@ -82,6 +91,7 @@ def regress(
         scenes: names, TOML files or configs; None = all that come with weldsim.
         methods: seam finders of weldsim's.  finders: {name: the caller's own}, judged besides.
         seeds: of the camera's noise, 0 to seeds - 1; each scene and seed is scanned once for all methods.
+        seeds_of: {method: its own number of seeds}.
         jobs: processes, each with one core (threads of native libraries are held to one); 1 = this process.
         config: settings; its method is replaced by each of `methods`.
         sensor: what looks.  execute: whether the simulated arm welds what was planned.
@@ -96,14 +106,15 @@ def regress(
     started, tell = time.perf_counter(), tell or (lambda what, done: None)
     chosen = _scenes(scenes)
     settings = _settings(config or CellConfig(), methods, finders or {})
-    for name, value in (("seeds", seeds), ("jobs", jobs)):
+    own = {method: (seeds_of or {}).get(method, seeds) for method in settings}
+    for name, value in (("seeds", seeds), ("jobs", jobs), *own.items()):
         if value < 1:
             raise InputError(f"{name} {value}: 1 or more is needed", key=name, value=value)
     tasks = [
         Task(
             scene=scene,
             seed=seed,
-            methods=settings,
+            methods={method: each for method, each in settings.items() if seed < own[method]},
             finders=dict(finders or {}),
             execute=execute,
             golden={} if golden is None else {method: golden.entries(scene.name, method) for method in settings},
@@ -112,15 +123,18 @@ def regress(
             pictures=pictures and seed == 0,
         )
         for scene in chosen
-        for seed in range(seeds)
+        for seed in range(max(own.values()))
     ]
     with _one_thread():
         done = _in_this_process(tasks, tell) if jobs == 1 else _in_processes(tasks, min(jobs, len(tasks)), tell)
     rows = [row for rows in done for row in rows]
     order = {(scene.name, method): k for k, (scene, method) in enumerate((s, m) for s in chosen for m in settings)}
     rows.sort(key=lambda row: (order[row.figures.scene, row.figures.method], row.figures.seed))
+    judgement = judge([row.figures for row in rows], golden or Golden())
+    rows = [replace(row, judged=row.judged or (row.figures.scene, row.figures.method) in judgement.judged) for row in rows]
     return Regression(
         rows=tuple(rows),
+        judgement=judgement,
         scenes=tuple(scene.name for scene in chosen),
         methods=tuple(settings),
         seeds=seeds,

@@ -3,6 +3,7 @@
 import statistics
 
 from weldsim import units
+from weldsim.regression.distribution import EVERY_SCENE, FALSE_ALARMS, Shift
 from weldsim.regression.figures import FIGURES, Figures
 from weldsim.regression.golden import Deviation
 from weldsim.regression.suite import Regression
@@ -45,6 +46,27 @@ def sentence(deviation: Deviation) -> str:
     )
 
 
+def shift_sentence(shift: Shift) -> str:
+    """What is worse over all seeds, where, and how often chance alone would make it so."""
+    s, figure = shift, FIGURES[shift.figure]
+    worse = f"{s.rank:.0%} of the recorded values are better than its seeds'"
+    if s.scene != EVERY_SCENE:
+        worse = f"median {number(s.figure, s.value)}, of those recorded {number(s.figure, s.golden)}: {worse}"
+    chances = f"by chance once in {1 / max(s.chance, 1e-12):.3g} runs (limit once in {1 / s.limit:.3g})"
+    return f"{s.scene}, {s.method}, {s.seeds} seed{'s' if s.seeds > 1 else ''}: {figure.label} {worse}, {chances}"
+
+
+def unjudged(outcome: Regression) -> str:
+    """Why methods with recorded distributions were not judged; empty where all were."""
+    few = {method for _, method in outcome.judgement.too_few}
+    if not few:
+        return ""
+    return (
+        f"{', '.join(sorted(few))}: too few seeds to tell worse from chance at {FALSE_ALARMS:.0%} false alarms a run;"
+        f" 3 or more are needed (--seeds)"
+    )
+
+
 def worst(figures: list[Figures], name: str) -> float | None:
     """The worst of a figure over the seeds that have it; None where none has."""
     values = _values(figures, name)
@@ -67,7 +89,7 @@ def _values(figures: list[Figures], name: str) -> list[float]:
 def standing(outcome: Regression, scene: str, method: str) -> str:
     """How a scene and method stand beside the golden figures: "ok", "WORSE" or "new"."""
     rows = outcome.of(scene, method)
-    if any(row.deviations for row in rows):
+    if any(row.deviations for row in rows) or any(s.method == method and s.scene in (scene, EVERY_SCENE) for s in outcome.shifts):
         return "WORSE"
     return "ok" if any(row.judged for row in rows) else "new"
 
@@ -82,7 +104,7 @@ def rows_of_text(outcome: Regression) -> list[list[str]]:
             cells = []
             for name, _ in COLUMNS:
                 middle, most = median(figures, name), worst(figures, name)
-                same = outcome.seeds == 1 or middle == most
+                same = len(figures) == 1 or middle == most
                 ends = (number(name, middle, unit=False), number(name, most, unit=False))
                 cells.append(ends[0] if same else " / ".join(ends))
             out.append([scene, method, f"{hit}/{known}", *cells, standing(outcome, scene, method)])
