@@ -106,15 +106,15 @@ def regress(
     started, tell = time.perf_counter(), tell or (lambda what, done: None)
     chosen = _scenes(scenes)
     settings = _settings(config or CellConfig(), methods, finders or {})
-    own = {method: (seeds_of or {}).get(method, seeds) for method in settings}
-    for name, value in (("seeds", seeds), ("jobs", jobs), *own.items()):
+    count_of = {method: (seeds_of or {}).get(method, seeds) for method in settings}
+    for name, value in (("seeds", seeds), ("jobs", jobs), *count_of.items()):
         if value < 1:
             raise InputError(f"{name} {value}: 1 or more is needed", key=name, value=value)
     tasks = [
         Task(
             scene=scene,
             seed=seed,
-            methods={method: each for method, each in settings.items() if seed < own[method]},
+            methods={method: each for method, each in settings.items() if seed < count_of[method]},
             finders=dict(finders or {}),
             execute=execute,
             golden={} if golden is None else {method: golden.entries(scene.name, method) for method in settings},
@@ -123,7 +123,7 @@ def regress(
             pictures=pictures and seed == 0,
         )
         for scene in chosen
-        for seed in range(max(own.values()))
+        for seed in range(max(count_of.values()))
     ]
     with _one_thread():
         done = _in_this_process(tasks, tell) if jobs == 1 else _in_processes(tasks, min(jobs, len(tasks)), tell)
