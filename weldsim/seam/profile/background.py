@@ -213,6 +213,8 @@ def _profiles(
     cells: Int[ndarray, "m a w 2"], shifts: Int[ndarray, "q 2"], free: Bool[ndarray, "r c"], height: Float[ndarray, "r c"]
 ) -> tuple[Float[ndarray, "q m w"], Float[ndarray, "q m w"]]:
     """Sum of the heights [m] over each block's samples along the line, and their number, at each shift."""
+    from weldsim.seam.profile import native
+
     h, w = free.shape
     # One border of empty cells stands for all that lies outside.
     known = np.zeros((h + 2, w + 2), np.float32)
@@ -221,11 +223,8 @@ def _profiles(
     values[1:-1, 1:-1] = np.where(free, height, 0.0)
     shape = (len(shifts), cells.shape[0], cells.shape[2])
     total, count = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    for k, (rows, columns) in enumerate(shifts.tolist()):
-        row = np.clip(cells[..., 0] + (rows + 1), 0, h + 1)
-        index = row * (w + 2) + np.clip(cells[..., 1] + (columns + 1), 0, w + 1)
-        total[k] = np.take(values, index).sum(axis=1)
-        count[k] = np.take(known, index).sum(axis=1)
+    row, column = (np.ascontiguousarray(cells[..., k]) for k in (0, 1))
+    native.profiles(row, column, shifts, known, values, total, count)
     return total, count
 
 

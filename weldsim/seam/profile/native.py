@@ -103,3 +103,59 @@ def coordinates(points, origins, station, places, t, e, n, step, s, x, h, slope,
             slope[i, 0] = (dx * tx + dy * ty + dz * tz) / inward
             slope[i, 1] = (dx * ex + dy * ey + dz * ez) / inward
             above[i] = (cx - bx) * nx + (cy - by) * ny + (cz - bz) * nz
+
+
+@_jit
+@no_type_check
+def normal_equations(design, weight, h, part, gram, right):
+    """Adds each row's share to the normal equations of the part it belongs to.
+
+    A row of B-splines is mostly zeros, which are passed over; and the sums come out alike on every processor.
+
+    Args:
+        design: (k, p).  weight, h: (k,).  part: (k,) from 0.  gram: (q, p, p), right: (q, p), zeros at first.
+    """
+    rows, size = design.shape
+    held = np.empty(size, np.int64)
+    for i in range(rows):
+        w, q = weight[i], part[i]
+        if w == 0.0:
+            continue
+        count = 0
+        for a in range(size):
+            if design[i, a] != 0.0:
+                held[count] = a
+                count += 1
+        for one in range(count):
+            a = held[one]
+            scaled = design[i, a] * w
+            right[q, a] += scaled * h[i]
+            for other in range(one, count):
+                gram[q, a, held[other]] += scaled * design[i, held[other]]
+    for q in range(len(gram)):
+        for a in range(size):
+            for b in range(a):
+                gram[q, a, b] = gram[q, b, a]
+
+
+@_jit
+@no_type_check
+def profiles(row, column, shifts, known, values, total, count):
+    """Sums of the values known over each block's samples along the line, at each shift, and their number.
+
+    Args:
+        row, column: (m, a, w) cells of the samples.  shifts: (q, 2) rows and columns.
+        known, values: (h + 2, w + 2) with a border of empty cells.  total, count: (q, m, w).
+    """
+    last_row, last_column = known.shape[0] - 1, known.shape[1] - 1
+    blocks, along, across = row.shape
+    for k in range(len(shifts)):
+        for m in range(blocks):
+            for x in range(across):
+                total[k, m, x] = count[k, m, x] = 0.0
+            for a in range(along):
+                for x in range(across):
+                    i = min(max(row[m, a, x] + shifts[k, 0] + 1, 0), last_row)
+                    j = min(max(column[m, a, x] + shifts[k, 1] + 1, 0), last_column)
+                    total[k, m, x] += values[i, j]
+                    count[k, m, x] += known[i, j]

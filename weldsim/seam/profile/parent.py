@@ -208,10 +208,24 @@ def _solve(
     penalty: Float[ndarray, "p p"],
     target: Float[ndarray, "p"],
 ) -> Float[ndarray, "p"]:
-    gram = design.T @ (design * weight[:, None])
+    grams, rights = _normal_equations(design, h, weight)
+    gram, right = grams[0], rights[0]
     # Each unknown's own scale: a ridge as stiff as the penalty would hold down the curvature across the seam.
     ridge = np.diag(1e-9 * (np.diag(gram) + 1e-6))
-    return np.linalg.solve(gram + penalty + ridge, design.T @ (weight * h) + target)
+    return np.linalg.solve(gram + penalty + ridge, right + target)
+
+
+def _normal_equations(
+    design: Float[ndarray, "k p"], h: Float[ndarray, "k"], weight: Float[ndarray, "k"], part: Int[ndarray, "k"] | None = None
+) -> tuple[Float[ndarray, "q p p"], Float[ndarray, "q p"]]:
+    """Matrix and right side of weighted least squares, for each part of the rows, numbered from 0; None = one part."""
+    from weldsim.seam.profile import native
+
+    each = np.zeros(len(h), np.int64) if part is None else part
+    parts, size = 1 if part is None else int(part.max(initial=0)) + 1, design.shape[1]
+    gram, right = np.zeros((parts, size, size)), np.zeros((parts, size))
+    native.normal_equations(design, weight, h, each, gram, right)
+    return gram, right
 
 
 def _choose_stiffness(
@@ -223,16 +237,13 @@ def _choose_stiffness(
     fold: Int[ndarray, "k"],
 ) -> float:
     """The stiffness that best predicts stretches left out."""
-    parts = []
-    for k in range(4):
-        rows, w = design[fold == k], weight[fold == k]
-        parts.append((rows.T @ (rows * w[:, None]), rows.T @ (w * h[fold == k])))
-    whole, right = np.sum([part[0] for part in parts], axis=0), np.sum([part[1] for part in parts], axis=0)
+    grams, rights = _normal_equations(design, h, weight, fold)
+    whole, right = grams.sum(axis=0), rights.sum(axis=0)
     ridge = 1e-9 * (1 + np.trace(whole) / len(whole)) * np.eye(len(whole))
     errors = []
     for stiffness in STIFFNESSES:
-        systems = np.stack([whole - part[0] + stiffness * penalty + ridge for part in parts])
-        sides = np.stack([right - part[1] + stiffness * target for part in parts])
+        systems = whole - grams + stiffness * penalty + ridge
+        sides = right - rights + stiffness * target
         theta = np.linalg.solve(systems, sides[..., None])[..., 0]
         errors.append(float(weight @ (h - np.einsum("ij,ij->i", design, theta[fold])) ** 2))
     best = min(errors)
