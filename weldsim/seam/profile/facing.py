@@ -15,6 +15,7 @@ SHARE = 0.08  # of the patches that a direction must have
 MOST = 5  # further directions
 OPPOSED = -0.35  # cosine to the main direction, under which a surface would be looked at from behind: a ridge is a valley there
 LAYER = 0.025  # [m] below the outermost point of a cell is still the same surface: deeper than a groove
+MOST_CUBES = 4_000_000  # are numbered by counting, more by sorting
 CELL = 0.003  # [m] of such a cell
 
 
@@ -49,19 +50,23 @@ def _patches(cloud: PointCloud) -> tuple[Float[ndarray, "k 3"], Float[ndarray, "
     keep = slice(None, None, max(1, len(cloud) // SAMPLE))
     points = cloud.points[keep]
     size = max(PATCH, 3.0 * _spacing(points))
-    cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
-    count = cell.max(axis=0) + 1
-    _, which, number = np.unique(
-        (cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2], return_inverse=True, return_counts=True
-    )
-    which = which.ravel()
+    key, cubes = _cubes(points, size)
+    if cubes <= MOST_CUBES:
+        held = np.bincount(key, minlength=cubes)
+        which, number = (np.cumsum(held > 0) - 1)[key], held[held > 0]
+    else:
+        _, which, number = np.unique(key, return_inverse=True, return_counts=True)
 
     def mean(values: Float[ndarray, "n"]) -> Float[ndarray, "k"]:
         return np.bincount(which, weights=values) / number
 
-    centres = np.stack([mean(column) for column in points.T], axis=1)
-    away = points - centres[which]
-    spread = np.stack([np.stack([mean(away[:, i] * away[:, j]) for j in range(3)], axis=1) for i in range(3)], axis=1)
+    columns = np.ascontiguousarray(points.T)
+    centres = np.stack([mean(column) for column in columns], axis=1)
+    away = [column - centre[which] for column, centre in zip(columns, centres.T, strict=True)]
+    spread = np.empty((len(number), 3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            spread[:, i, j] = spread[:, j, i] = mean(away[i] * away[j])
     values, vectors = np.linalg.eigh(spread)
     flat = (number >= 6) & (values[:, 0] < 0.1 * values[:, 1])
     normals = vectors[:, :, 0]
@@ -71,11 +76,21 @@ def _patches(cloud: PointCloud) -> tuple[Float[ndarray, "k 3"], Float[ndarray, "
     return centres[flat], normals[flat], cloud.normals is not None
 
 
+def _cubes(points: Float[ndarray, "n 3"], size: float) -> tuple[Int[ndarray, "n"], int]:
+    """The number of the cube of edge `size` [m] in which each point lies, and how many cubes there are."""
+    key, cubes = np.zeros(len(points), np.int64), 1
+    for column in points.T:
+        place = ((column - column.min()) / size).astype(np.int64)
+        count = int(place.max()) + 1
+        key, cubes = key * count + place, cubes * count
+    return key, cubes
+
+
 def _spacing(points: Float[ndarray, "n 3"]) -> float:
     """Usual distance between points [m], from the cubes of a coarse grid that hold any."""
-    size = max(float(np.ptp(points, axis=0).max()) / 64, 1e-6)
-    cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
-    held = len(np.unique(cell @ np.array([1, 1_000, 1_000_000])))
+    size = max(max(float(np.ptp(column)) for column in points.T) / 64, 1e-6)
+    key, cubes = _cubes(points, size)
+    held = np.count_nonzero(np.bincount(key, minlength=cubes))
     return float(np.sqrt(held * size**2 / len(points)))
 
 
