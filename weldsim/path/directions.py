@@ -7,6 +7,8 @@ from numpy import ndarray
 from weldsim.frames import unit
 from weldsim.quantity import Metre, Radian, RadianPerMetre
 
+BATCH = 64  # nodes smoothed together
+
 
 def one_sided(directions: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
     """The directions without flips: each on the side of the one before it, all on the side most of them were on."""
@@ -26,14 +28,16 @@ def smooth(s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], length: Me
     # Nodes count by the length they stand for, so dense stretches do not outweigh sparse ones.
     share = np.gradient(s)
     out = np.empty_like(directions)
-    for i, at in enumerate(s):
-        low, high = np.searchsorted(s, [at - 4 * length, at + 4 * length])
-        d = s[low:high] - at
-        w = share[low:high] * np.exp(-0.5 * (d / length) ** 2)
-        m0, m1, m2 = w.sum(), w @ d, w @ (d * d)
+    for first in range(0, len(s), BATCH):
+        at = s[first : first + BATCH]
+        low, high = np.searchsorted(s, [at[0] - 4 * length, at[-1] + 4 * length])
+        d = s[low:high] - at[:, None]
+        w = np.where((d >= -4 * length) & (d < 4 * length), share[low:high] * np.exp(-0.5 * (d / length) ** 2), 0.0)
+        m0, m1, m2 = (moment.sum(axis=1)[:, None] for moment in (w, w * d, w * d * d))
         spread = m0 * m2 - m1 * m1
-        kernel = w * (m2 - m1 * d) / spread if spread > 1e-12 * m0 * m0 * length * length else w / m0
-        out[i] = kernel @ directions[low:high]
+        line = spread > 1e-12 * m0 * m0 * length * length
+        kernel = np.where(line, w * (m2 - m1 * d) / np.where(line, spread, 1.0), w / m0)
+        out[first : first + BATCH] = kernel @ directions[low:high]
     return unit(out)
 
 
