@@ -159,3 +159,39 @@ def profiles(row, column, shifts, known, values, total, count):
                     j = min(max(column[m, a, x] + shifts[k, 1] + 1, 0), last_column)
                     total[k, m, x] += values[i, j]
                     count[k, m, x] += known[i, j]
+
+
+@_jit
+@no_type_check
+def blurred(v, x, wide, share, turn, changed, moved, depth, jacobian):
+    """Adds what a blurred polyline's corners make of its depth and of how that changes: `weldsim.seam.profile.section.ramps`,
+    summed over the corners.
+
+    Args:
+        v, turn: (s, g, 4) places [m] and changes of slope of the corners.  x: (g, w) [m].
+        wide: (s, g) of the wider box [m].  share: (s,) of it that the narrower one has.
+        changed, moved: (p, s, g, 4) how the turns change with p unknowns; the turns times how their corners move.
+        depth: (s, g, w).  jacobian: (s, p + 2, g, w), the last two for the boxes' width and their share.
+    """
+    unknowns = len(changed)
+    for s in range(v.shape[0]):
+        for g in range(v.shape[1]):
+            width, part = wide[s, g], share[s]
+            narrow = part * width
+            outer, inner = (width + narrow) / 2, (width - narrow) / 2
+            scale = 1.0 / (width * narrow)
+            for c in range(v.shape[2]):
+                bend = turn[s, g, c]
+                for k in range(x.shape[1]):
+                    y = v[s, g, c] - x[g, k]
+                    a, b = max(y + outer, 0.0), max(y + inner, 0.0)
+                    e, f = max(y - inner, 0.0), max(y - outer, 0.0)
+                    aa, bb, ee, ff = a * a, b * b, e * e, f * f
+                    ramp = (a * aa - b * bb - e * ee + f * ff) * (scale / 6)
+                    slope = (aa - bb - ee + ff) * (scale / 2)
+                    over, under = (aa - ff) * (scale / 4), (bb - ee) * (scale / 4)
+                    depth[s, g, k] += bend * ramp
+                    for p in range(unknowns):
+                        jacobian[s, p, g, k] += changed[p, s, g, c] * ramp + moved[p, s, g, c] * slope
+                    jacobian[s, unknowns, g, k] += bend * (over * (1 + part) - under * (1 - part) - 2 * ramp / width)
+                    jacobian[s, unknowns + 1, g, k] += bend * ((over + under) * width - ramp / part)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from weldsim.seam.profile.section import Section, footprint, ramps, turns, vertices
+from weldsim.seam.profile.section import NARROWEST, SHARPEST, Section, footprint, turns, vertices
 from weldsim.seam.profile.views import Views
 
 # Unknowns: middle, width, depth [m]; floor; lean over the most that leaves no wall overhanging; blur [m]; taper.
@@ -67,28 +67,24 @@ def predict(
 
     Blurring is linear, so only the corners are differentiated by differences; what follows from them is exact.
     """
+    from weldsim.seam.profile import native
+
     s = len(theta)
     moves = np.concatenate([np.zeros((1, 7)), DELTA * np.diag(UNIT)[:BLUR]])
     v, d = vertices(_corners((theta + moves[:, None]).reshape(-1, 7), step), shear)
     kinks = turns(v, d)
     v, kinks = v.reshape(BLUR + 1, s, *v.shape[1:]), kinks.reshape(BLUR + 1, s, *kinks.shape[1:])
     stretch = footprint(shear)
-    ramp, slope, widening, tapering = ramps(v[0][..., None] - x[:, None], theta[:, BLUR, None] * stretch, theta[:, TAPER])
+    wide, share = np.maximum(theta[:, BLUR, None] * stretch, SHARPEST), np.maximum(theta[:, TAPER], NARROWEST)
     # For each corner: its turn, how that changes with the unknowns, and its turn times how it moves.
     turn, changed = kinks[0], (kinks[1:] - kinks[0]) / DELTA
     moved = turn * (v[1:] - v[0]) / DELTA
-    by_ramp = _sums(np.concatenate([turn[None], changed]), ramp)
-    depth = d.reshape(BLUR + 1, s, *d.shape[1:])[0, ..., :1] + by_ramp[0]
-    jacobian = np.empty((s, 7, *depth.shape[1:]))
-    jacobian[:, :BLUR] = (by_ramp[1:] + _sums(moved, slope)).transpose(1, 0, 2, 3)
-    jacobian[:, BLUR] = _sums(turn[None], widening)[0] * stretch[:, None] * UNIT[BLUR]
-    jacobian[:, TAPER] = _sums(turn[None], tapering)[0] * UNIT[TAPER]
+    depth = np.repeat(d.reshape(BLUR + 1, s, *d.shape[1:])[0, ..., :1], x.shape[1], axis=2)
+    jacobian = np.zeros((s, 7, *depth.shape[1:]))
+    native.blurred(v[0], x, wide, share, turn, changed, moved, depth, jacobian)
+    jacobian[:, BLUR] *= stretch[:, None] * UNIT[BLUR]
+    jacobian[:, TAPER] *= UNIT[TAPER]
     return depth, jacobian
-
-
-def _sums(factors: Float[ndarray, "p s g 4"], each: Float[ndarray, "s g 4 w"]) -> Float[ndarray, "p s g w"]:
-    """The corners' curves summed with each set of factors."""
-    return (factors.transpose(1, 2, 0, 3) @ each).transpose(2, 0, 1, 3)
 
 
 def _corners(theta: Float[ndarray, "s 7"], step: float) -> Float[ndarray, "s 6"]:
