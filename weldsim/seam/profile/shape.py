@@ -96,8 +96,9 @@ def terms(theta: Float[ndarray, "s 7"], views: Views, step: float) -> tuple[Floa
     """Whitened residuals and their Jacobian in UNITs, those of the priors last."""
     depth, jacobian = predict(theta, step, views.at, views.shear)
     root, s = np.sqrt(views.weight), len(theta)
-    data = (((depth - views.depth) * root) @ views.white.T).reshape(s, -1)
-    slopes = ((jacobian * root) @ views.white.T).reshape(s, 7, -1)
+    w = views.depth.shape[1]  # one product of tall matrices costs less than many of small ones
+    data = (((depth - views.depth) * root).reshape(-1, w) @ views.white.T).reshape(s, -1)
+    slopes = ((jacobian * root).reshape(-1, w) @ views.white.T).reshape(s, 7, -1)
     slender = np.log(theta[:, 2] / theta[:, 1] / SLENDER_PRIOR[0]) / SLENDER_PRIOR[1]
     prior = np.stack([theta[:, 3] / FLOOR_PRIOR, slender, (theta[:, TAPER] - TAPER_PRIOR[0]) / TAPER_PRIOR[1]], axis=1)
     steep = np.zeros((s, 7, 3))
