@@ -265,7 +265,8 @@ def _own_curvature(
         if np.count_nonzero(here) < 24:
             continue
         y = x[here]
-        shape = y**2 - np.polyval(np.polyfit(y, y**2, 1), y)
+        z, square = y - y.mean(), y**2
+        shape = square - square.mean() - float(z @ square) / max(float(z @ z), 1e-18) * z  # less its own best line
         votes.append(float(shape @ (residual[here] + c * y**2)))
         strengths.append(float(shape @ shape))
     if len(votes) < 4:
