@@ -170,7 +170,7 @@ def chart_from(points: Float[ndarray, "n 3"], viewpoint: Float[ndarray, "3"]) ->
     axes = _axes(unit(_middle(points) - viewpoint))
     x, y, z = axes @ (points - viewpoint).T
     front = z > 1e-3
-    depth0 = float(np.median(z[front])) if front.any() else 1.0
+    depth0 = _usual(z, front)
     safe = np.where(front, z, depth0)
     return _chart(x / safe, y / safe, depth0**2 / safe - depth0, front, axes, viewpoint, depth0, perspective=True)
 
@@ -181,8 +181,13 @@ def chart_along(points: Float[ndarray, "n 3"], forward: Float[ndarray, "3"], dis
     origin = _middle(points) - distance * forward
     x, y, z = axes @ (points - origin).T
     front = z > 1e-3
-    depth0 = float(np.median(z[front])) if front.any() else 1.0
+    depth0 = _usual(z, front)
     return _chart(x, y, depth0 - z, front, axes, origin, depth0, perspective=False)
+
+
+def _usual(depth: Float[ndarray, "n"], front: Bool[ndarray, "n"]) -> float:
+    """Median depth of the points in front [m]; 1 m where there is none."""
+    return float(np.median(depth if front.all() else depth[front])) if front.any() else 1.0
 
 
 def _middle(points: Float[ndarray, "n 3"]) -> Float[ndarray, "3"]:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from weldsim.curves import interpolate
@@ -345,12 +345,15 @@ def _longest_path(part: Bool[ndarray, "h w"], depth: Float[ndarray, "h w"]) -> t
         lengths.append(np.full(int(both.sum()), np.hypot(dr, dc)))
     i, j, d = np.concatenate(starts), np.concatenate(ends), np.concatenate(lengths)
     n = len(rows)
-    plain = coo_matrix((d, (i, j)), (n, n)).tocsr()
-    first = int(np.argmax(_finite(dijkstra(plain, directed=False, indices=0))))
-    second = int(np.argmax(_finite(dijkstra(plain, directed=False, indices=first))))
+    # Both ways of every step, built once: an undirected search would turn the graph over at every call.
+    both_ways = coo_matrix((np.tile(np.arange(1, len(d) + 1), 2), (np.append(i, j), np.append(j, i))), (n, n)).tocsr()
+    step = both_ways.data - 1
+    plain = csr_matrix((d[step], both_ways.indices, both_ways.indptr), (n, n))
+    first = int(np.argmax(_finite(dijkstra(plain, indices=0))))
+    second = int(np.argmax(_finite(dijkstra(plain, indices=first))))
     cost = d / (0.05 + (merit[rows[i], columns[i]] + merit[rows[j], columns[j]]) / 2) ** 2
-    weighted = coo_matrix((cost, (i, j)), (n, n)).tocsr()
-    _, before = dijkstra(weighted, directed=False, indices=first, return_predecessors=True)
+    weighted = csr_matrix((cost[step], both_ways.indices, both_ways.indptr), (n, n))
+    _, before = dijkstra(weighted, indices=first, return_predecessors=True)
     order = [second]
     while order[-1] != first and before[order[-1]] >= 0:
         order.append(int(before[order[-1]]))
