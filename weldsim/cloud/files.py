@@ -1,10 +1,11 @@
-"""Clouds in files: PLY, PCD, XYZ/TXT/CSV, NPZ and NPY in, PLY, NPZ and XYZ out.
+"""Clouds in files: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ and NPY in, PLY, NPZ and XYZ out.
 
 The format is found from the first bytes, not from the name. Whatever cannot be used is a `CloudFileError` (the bytes) or a
 `CloudError` (the points), in one line. Depth images are read by `weldsim.cloud.depth_files`, repeated here.
 """
 
 import io
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -15,35 +16,42 @@ from numpy import ndarray
 
 from weldsim.cloud.arrays import read_array_cloud
 from weldsim.cloud.depth_files import read_depth_frame, write_depth_png
+from weldsim.cloud.extent import METRES, MIN_SPAN, check_extent, check_grain, check_reach, check_viewpoints, cropped_to
 from weldsim.cloud.pcd import read_pcd
 from weldsim.cloud.ply import read_ply
+from weldsim.cloud.ptx import is_ptx, read_ptx
 from weldsim.cloud.raw import RawCloud, Unreadable
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
 from weldsim.errors import CloudError, CloudFileError, OutputError
 from weldsim.output import write_whole
-from weldsim.records import MILLIMETRE_SPAN, PointCloud
+from weldsim.records import PointCloud
 
 __all__ = ["LengthUnit", "check_plannable", "read_cloud", "read_depth_frame", "write_cloud", "write_depth_png"]
 
 LengthUnit = Literal["m", "cm", "mm", "in"]
-_METRES: dict[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
-MIN_SPAN = 0.005  # [m] a cloud smaller than this was scaled down twice, or shows no weld
-MAX_GRAIN = 0.0002  # [m] between neighbouring coordinates of a file in single precision
+_OTHERS = {b"LASF": "a LAS or LAZ file", b"ASTM-E57": "an E57 file", b"solid ": "an STL mesh", b"OFF": "an OFF mesh"}
 MIN_POINTS = 100  # fewer cannot show a groove
 MIN_BREADTH = 0.001  # [m] rms breadth across the longest direction below which the points are a line
 
 
-def read_cloud(path: str | Path, *, unit: LengthUnit = "m", viewpoint: Sequence[float] | ndarray | None = None) -> PointCloud:
+def read_cloud(
+    path: str | Path,
+    *,
+    unit: LengthUnit | None = None,
+    viewpoint: Sequence[float] | ndarray | None = None,
+    crop: tuple[Sequence[float], Sequence[float]] | None = None,
+) -> PointCloud:
     """The cloud in a file, in metres, expressed in the robot base; points that are not finite are dropped.
 
     Args:
-        path: PLY, PCD, XYZ/TXT/CSV, NPZ or NPY, told apart by content.
-        unit: the file's unit of length.
+        path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, told apart by content.
+        unit: the file's unit of length; by default the one that its columns' names give, else metres.
         viewpoint: where the camera stood (3,) [m] in the same frame; it outranks what the file says.
+        crop: lower and upper corner of the box that is kept [m]; by default everything is.
     Raises:
         CloudFileError: missing, unreadable, cut off, or no cloud.
-        CloudError: no finite point, coordinates too coarse, or an extent that shows that `unit` is wrong.
+        CloudError: no finite point, coordinates too coarse, an extent that shows that `unit` is wrong, or a camera too far away.
     """
     data = read_bytes(path)
     try:
@@ -51,19 +59,29 @@ def read_cloud(path: str | Path, *, unit: LengthUnit = "m", viewpoint: Sequence[
             raw = _reader(data)(data)
     except Unreadable as error:
         raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
+    said = unit or raw.unit or "m"
+    if raw.unit is not None and said != raw.unit:
+        raise CloudError(f"{path}: --units {said}, but its columns are named in {raw.unit}; leave --units out", path=str(path))
+    scale = METRES[said]
     keep = _finite_rows(raw.points)
     total, dropped = len(keep), int((~keep).sum())
     if dropped == total:
         raise CloudError(f"{path}: none of its {total} points is finite", path=str(path), total=total)
     with np.errstate(over="ignore", invalid="ignore"):
-        _check_grain(str(path), raw.points[keep] if dropped else raw.points, _METRES[unit])
-        points = (raw.points if dropped == 0 else raw.points[keep]) * _METRES[unit]
-        _check_extent(str(path), points, unit, dropped)
-    viewpoints, view = _viewpoints(raw, _METRES[unit], viewpoint)
+        check_grain(str(path), raw.points[keep] if dropped else raw.points, scale)
+        if crop is not None:
+            keep &= cropped_to(crop, raw.points * scale)
+            if not keep.any():
+                raise CloudError(f"crop box: none of the {total} points of {path} is in it; change cloud.crop_min and crop_max")
+        whole = bool(keep.all())
+        points = (raw.points if whole else raw.points[keep]) * scale
+        check_extent(str(path), points, said, dropped, raw)
+    viewpoints, view = _viewpoints(raw, scale, viewpoint)
+    check_viewpoints(str(path), points, viewpoints, option=viewpoint is not None)
     return PointCloud(
         points=points,
         normals=_unit_normals(raw.normals, keep),
-        colours=None if raw.colours is None else raw.colours[keep] if dropped else raw.colours,
+        colours=None if raw.colours is None else raw.colours if whole else raw.colours[keep],
         viewpoints=viewpoints,
         view=None if view is None else view[keep],
     )
@@ -79,57 +97,28 @@ def _reader(data: bytes) -> Callable[[bytes], RawCloud]:
         raise Unreadable("it is a PNG image; a depth image needs its intrinsics beside it (--intrinsics)")
     if data[:2] == b"\x1f\x8b":
         raise Unreadable("it is gzip-compressed; unpack it first")
+    for magic, name in _OTHERS.items():
+        if data.startswith(magic):
+            raise Unreadable(f"it is {name}; export the cloud as PLY, PCD or XYZ text")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise Unreadable("it is UTF-16 text; save it as UTF-8")
     head = data[:4096]
     if head.startswith((b"# .PCD", b"VERSION")) or (b"\nFIELDS" in head and b"\nSIZE" in head):
         return read_pcd
-    return read_text
+    if re.search(rb"^v[ \t]+[-+.\d]", head, re.MULTILINE):
+        return _read_obj
+    return read_ptx if is_ptx(head) else read_text
+
+
+def _read_obj(data: bytes) -> RawCloud:
+    """The vertices of an OBJ."""
+    return read_text(b"\n".join(re.findall(rb"^v[ \t]+([^\n]*)", data, re.MULTILINE)))
 
 
 def _finite_rows(points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
     """Which points are finite."""
     x, y, z = np.isfinite(points).T
     return x & y & z
-
-
-def _check_grain(path: str, points: Float[ndarray, "n 3"], scale: float) -> None:
-    """Raises CloudError where single precision, so far from the origin, leaves less than the shape of a groove."""
-    reach = float(np.abs(points).max())
-    grain = float(np.spacing(np.float32(min(reach, 1e30)))) * scale
-    if grain > MAX_GRAIN and (points.astype(np.float32) == points).all():
-        raise CloudError(
-            f"{path}: its single-precision coordinates reach {reach * scale:.3g} m, where they lie {grain * 1e3:.2g} mm apart"
-            f" (limit {MAX_GRAIN * 1e3:g} mm): subtract the offset before saving, or save doubles",
-            path=path,
-            grain=grain,
-            limit=MAX_GRAIN,
-        )
-
-
-def _check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: int) -> None:
-    """Raises CloudError when the extent shows that the unit is wrong."""
-    span = float(np.ptp(points, axis=0).max())
-    left_out = f" ({dropped} points that are not finite left out)" if dropped else ""
-    if span > MILLIMETRE_SPAN:
-        low, high = np.percentile(points[:: max(1, len(points) // 20_000)], [2, 98], axis=0)
-        bulk = float((high - low).max())
-        if bulk <= MILLIMETRE_SPAN / 2:
-            advice = f"96 % of the points lie within {bulk:.3g} m: remove the stray ones"
-        elif unit == "m" and span <= MILLIMETRE_SPAN * 1e3:
-            advice = "it looks like millimetres: pass --units mm"
-        else:
-            advice = "check its unit, or crop it to the workpiece"
-        raise CloudError(
-            f"{path}: spans {span:.4g} m read in {unit} (limit {MILLIMETRE_SPAN:g} m){left_out}; {advice}", path=path, span=span
-        )
-    if unit != "m" and 0 < span < MIN_SPAN:
-        raise CloudError(
-            f"{path}: spans {span * 1e3:.3g} mm read in {unit} (least {MIN_SPAN * 1e3:g} mm){left_out}; it looks like metres:"
-            " pass --units m",
-            path=path,
-            span=span,
-        )
 
 
 def _unit_normals(normals: Float[ndarray, "n 3"] | None, keep: Bool[ndarray, "n"]) -> Float[ndarray, "m 3"] | None:
@@ -165,7 +154,8 @@ def check_plannable(cloud: PointCloud) -> None:
     """Nothing, when the cloud could show a seam.
 
     Raises:
-        CloudError: fewer than 100 points, an extent below 5 mm, or points along a line; `data` has the figure.
+        CloudError: fewer than 100 points, an extent below 5 mm, points along a line, or none within an arm's reach; `data` has
+            the figure.
     """
     if len(cloud) < MIN_POINTS:
         raise CloudError(f"the cloud has {len(cloud)} points, planning needs {MIN_POINTS}", points=len(cloud), limit=MIN_POINTS)
@@ -180,6 +170,7 @@ def check_plannable(cloud: PointCloud) -> None:
             f"the cloud is a line: its points lie within {breadth * 1e3:.2g} mm rms of it (least {MIN_BREADTH * 1e3:g} mm)",
             breadth=breadth,
         )
+    check_reach(cloud)
 
 
 def write_cloud(path: str | Path, cloud: PointCloud) -> Path:

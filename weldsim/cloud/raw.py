@@ -24,6 +24,8 @@ class RawCloud:
         colours: (n, 3) in [0, 1], or None.
         viewpoints: (k, 3) where the cameras stood, in the file's unit; k = 0 when the file does not say.
         view: (n,) which viewpoint saw each point, or None.
+        unit: of length, "m", "cm", "mm" or "in", where the file says; None where it does not.
+        numbered: whether what was read as x counts the rows.
     """
 
     points: Float[ndarray, "n 3"]
@@ -31,6 +33,8 @@ class RawCloud:
     colours: Float[ndarray, "n 3"] | None = None
     viewpoints: Float[ndarray, "k 3"] | None = None
     view: ndarray | None = None
+    unit: str | None = None
+    numbered: bool = False
 
 
 def check_count(count: int) -> None:
@@ -46,7 +50,9 @@ NORMALS = [("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")]
 COLOURS = [("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue")]
 
 
-def from_columns(columns: Mapping[str, ndarray], *, viewpoints: Float[ndarray, "k 3"] | None = None) -> RawCloud:
+def from_columns(
+    columns: Mapping[str, ndarray], *, viewpoints: Float[ndarray, "k 3"] | None = None, unit: str | None = None
+) -> RawCloud:
     """The cloud in named columns of equal length. Raises Unreadable when x, y or z is not among them."""
 
     def stack(choices: list[tuple[str, str, str]]) -> ndarray | None:
@@ -65,7 +71,7 @@ def from_columns(columns: Mapping[str, ndarray], *, viewpoints: Float[ndarray, "
     if colours is not None:
         whole = all(columns[name].dtype.kind in "iu" for names in COLOURS for name in names if name in columns)
         colours = unit_colours(colours, whole=whole)
-    return RawCloud(points=points, normals=stack(NORMALS), colours=colours, viewpoints=viewpoints)
+    return RawCloud(points=points, normals=stack(NORMALS), colours=colours, viewpoints=viewpoints, unit=unit)
 
 
 def unit_colours(colours: Float[ndarray, "n 3"], *, whole: bool = False) -> Float[ndarray, "n 3"]:

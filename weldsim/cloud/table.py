@@ -3,25 +3,27 @@
 import io
 import re
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.cloud.raw import NORMALS, XYZ, RawCloud, Unreadable, check_count, from_columns, unit_colours
+from weldsim.cloud.raw import COLOURS, NORMALS, XYZ, RawCloud, Unreadable, check_count, from_columns, unit_colours
+from weldsim.columns import HEADER_LINES, SAMPLE, UNITS, TextTable, by_role, counts, decode, find_table, is_number
 
-_HEADER_LINES = 64  # titles, comments and column names may take this many lines before the first point
-_COMMENT_LINE = re.compile(rb"^[ \t]*(?://|%)[^\n]*", re.MULTILINE)
+_HEAD = 1 << 20  # bytes in which the first row is looked for
+_TAKEN = ("m", "cm", "mm", "in")  # units that read_cloud knows by these names
 
 
 def parse_table(
-    text: bytes, *, columns: int, rows: int | None = None, delimiter: str | None = None
+    text: bytes, *, columns: int | Sequence[int], rows: int | None = None, delimiter: str | None = None
 ) -> Float[ndarray, "rows columns"]:
-    """The first `columns` numbers of each line.
+    """The first `columns` numbers of each line, or those in the columns listed.
 
     Args:
         text: lines of numbers; blank lines and what follows a # are passed over.
-        columns: how many each line must have at least.
+        columns: how many each line must have at least, or which are read, counted from 0.
         rows: read exactly so many lines; None reads all.
         delimiter: between the numbers; None is white space.
     Raises:
@@ -29,12 +31,11 @@ def parse_table(
     """
     if not text.strip():
         raise Unreadable("its header promises points, none follow")
+    used = range(columns) if isinstance(columns, int) else columns
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # numpy warns on input without data
-            table = np.loadtxt(
-                io.BytesIO(text), ndmin=2, delimiter=delimiter, usecols=range(columns), max_rows=rows, encoding="latin1"
-            )
+            table = np.loadtxt(io.BytesIO(text), ndmin=2, delimiter=delimiter, usecols=used, max_rows=rows, encoding="latin1")
     except (ValueError, UserWarning, OverflowError) as error:
         raise Unreadable(f"its numbers cannot be read: {str(error).rstrip('.')[:120]}") from None
     if rows is not None and len(table) < rows:
@@ -43,68 +44,111 @@ def parse_table(
 
 
 def read_text(data: bytes) -> RawCloud:
-    """The points of a text file: x y z first on each line, or under a line of names that says where.
+    """The points of a text file: x y z first on each line, or in the columns that a line above the first names so.
 
-    White space, comma or semicolon between; decimal commas where semicolons separate. Six unnamed columns are colours when
-    the last three are whole numbers up to 255, normals when they are unit vectors; further columns are passed over.
+    White space, comma or semicolon between; decimal commas where a comma is not what separates. Names are believed, and
+    their units. Six unnamed columns are colours when the last three are whole numbers up to 255, normals when they are
+    unit vectors; further columns are passed over, and a name of each point before them.
 
     Raises:
-        Unreadable: no line of three numbers at the beginning, or a later line that is none.
+        Unreadable: no line of three numbers at the beginning, names without x, y and z, or a later line that is no row.
     """
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\0" in data[:65_536]:
         raise Unreadable("it is binary, and no PLY, PCD, NPZ or NPY")
     if b"\r" in data and b"\n" not in data:
         data = data.replace(b"\r", b"\n")
-    if _COMMENT_LINE.search(data):
-        data = _COMMENT_LINE.sub(lambda match: b"#" + match[0].lstrip()[1:], data)
-    start, first, header = _first_row(data)
-    body = data[start:]
-    if ";" in first and "," in first and "." not in first:
-        body, first = body.replace(b",", b"."), first.replace(",", ".")
-    delimiter, width = max(((mark, _leading_numbers(first.split(mark))) for mark in (None, ";", ",")), key=lambda pair: pair[1])
-    if width < 3:
-        raise Unreadable(f"it is no cloud: its numbers are separated in more than one way: {first[:40]!r}")
-    table = parse_table(body, columns=width, delimiter=delimiter)
-    check_count(len(table))
-    if len(header) >= width and all(name in header[:width] for name in XYZ[0]):
-        return from_columns({name: table[:, i] for i, name in reversed(list(enumerate(header[:width])))})
-    return _unnamed(table)
+    lines = _head(data)
+    table = find_table(lines)
+    if table is None:
+        raise Unreadable(f"it is no cloud: none of its first {HEADER_LINES} lines starts with three numbers")
+    columns, units = _columns(table, lines[table.first : table.first + SAMPLE])
+    points = _read(data, table, list(columns.values()))
+    check_count(len(points))
+    if table.names is None:
+        return _unnamed(points, table.width)
+    named = dict(zip(columns, points.T, strict=True))
+    scales = [UNITS[unit] for unit in units.values()]
+    same = len(set(scales)) == 1 and next((name for name in _TAKEN if UNITS[name] == scales[0]), None)
+    if units and not same:  # each its own, or one that nobody can ask for: metres then
+        for axis in XYZ[0]:
+            named[axis] = named[axis] * UNITS[units.get(axis, "m")]
+    return from_columns(named, unit=same or ("m" if units else None))
 
 
-def _first_row(data: bytes) -> tuple[int, str, list[str]]:
-    """Where the first line with three numbers starts, that line, and the column names above it (or none)."""
-    start, header = 0, []
-    for _ in range(_HEADER_LINES):
-        end = data.find(b"\n", start)
-        line = data[start : end if end >= 0 else len(data)][:4096].decode("latin1").split("#")
-        words = re.split(r"[;,\s]+", line[0].strip()) if line[0].strip() else []
-        if _leading_numbers(words) >= 3:
-            return start, line[0].strip(), header
-        named = [word.strip("\"'").lower() for word in re.split(r"[;,\s/]+", " ".join(line)) if word]
-        header = named if named else header
-        if end < 0:
-            break
-        start = end + 1
-    raise Unreadable(f"it is no cloud: none of its first {_HEADER_LINES} lines starts with three numbers")
+def _head(data: bytes) -> list[str]:
+    """The first lines, whole ones alone."""
+    head = data[:_HEAD]
+    return decode(head if len(data) <= _HEAD else head[: head.rfind(b"\n") + 1]).split("\n")
 
 
-def _leading_numbers(words: list[str]) -> int:
-    """How many of the first words are numbers."""
-    for count, word in enumerate(words):
-        try:
-            float(word)
-        except ValueError:
-            return count
-    return len(words)
+def _columns(table: TextTable, rows: Sequence[str]) -> tuple[dict[str, int], dict[str, str]]:
+    """Which columns are read, by what they hold (or by their number where nothing names them), and the axes' units."""
+    if table.names is None:
+        cells = table.cells(rows[0])
+        start = 0 if is_number(cells[0]) else 1
+        numbers = next((i for i, cell in enumerate(cells[start:]) if not is_number(cell)), len(cells) - start)
+        _check_decimals(table, rows)
+        return {str(i): start + i for i in range(6 if numbers == 6 else 3)}, {}
+    try:
+        found = by_role(table.names)
+    except ValueError as error:
+        raise Unreadable(str(error)) from None
+    units = {axis: unit for axis in XYZ[0] if (unit := table.names[found[axis]].unit) is not None}
+    for axis, unit in units.items():
+        if unit not in UNITS:
+            text = table.names[found[axis]].text
+            raise Unreadable(f"its column {text[:40]!r} is in {unit[:20]}; lengths are in m, cm, mm or in")
+    if len(units) in (1, 2) and len(set(units.values())) == 1:  # written once, meant for all
+        units = dict.fromkeys(XYZ[0], next(iter(units.values())))
+    together = [names for names in (*NORMALS[:1], *COLOURS[:1]) if all(name in found for name in names)]
+    wanted = [*XYZ[0], *(name for names in together for name in names)]
+    return {name: found[name] for name in wanted}, units
 
 
-def _unnamed(table: Float[ndarray, "n k"]) -> RawCloud:
+def _check_decimals(table: TextTable, rows: Sequence[str]) -> None:
+    """Raises Unreadable where six columns between commas are three numbers with decimal commas: 0,012 is no two whole numbers."""
+    if table.delimiter != "," or table.width != 6:
+        return
+    cells = [row for row in map(table.cells, rows) if len(row) == 6]
+    whole = all(re.fullmatch(r"[-+]?\d+", cell) for row in cells for cell in row)
+    if whole and any(re.fullmatch(r"0\d+", cell) for row in cells for cell in row[1::2]):
+        raise Unreadable("its numbers seem to have decimal commas, and commas between them: put ; between them")
+
+
+def _read(data: bytes, table: TextTable, columns: list[int]) -> Float[ndarray, "n k"]:
+    """The numbers in those columns of every row. Raises Unreadable, naming the first line that is none."""
+    start = 0
+    for _ in range(table.first):
+        start = data.find(b"\n", start) + 1
+    body = re.sub(_COMMENTS if table.delimiter != ";" else _COMMENTS_BUT_SEMICOLONS, b"#", data[start:])
+    if b'"' in body:
+        body = re.sub(rb'"([^"\n]*)"', lambda quoted: quoted[1].replace(b",", b"."), body)
+    if table.delimiter != "," and b"," in body and (table.decimal_comma or not re.search(rb"\d\.\d", body)):
+        body = body.replace(b",", b".")
+    try:
+        return parse_table(body, columns=columns, delimiter=table.delimiter)
+    except Unreadable:
+        for number, line in enumerate(body.split(b"\n"), table.first + 1):
+            text = line.decode("latin1").partition("#")[0]
+            cells = [cell.strip() for cell in text.split(table.delimiter)]
+            if text.strip() and not all(i < len(cells) and is_number(cells[i]) for i in columns):
+                shown = text.strip()[:40]
+                raise Unreadable(f"its numbers cannot be read: line {number}: {shown!r}, not like the rows before") from None
+        raise
+
+
+_COMMENTS_BUT_SEMICOLONS = re.compile(rb"^[ \t]*(?://|/\*|%|!|\*|--|REM\b)", re.MULTILINE | re.IGNORECASE)
+_COMMENTS = re.compile(rb"^[ \t]*(?:;|//|/\*|%|!|\*|--|REM\b)", re.MULTILINE | re.IGNORECASE)
+
+
+def _unnamed(table: Float[ndarray, "n k"], width: int) -> RawCloud:
     points, rest = table[:, :3], table[:, 3:6]
+    numbered = width > 3 and len(table) >= 100 and counts(points[:, 0].tolist())
     if table.shape[1] != 6 or not np.isfinite(rest).all():
-        return RawCloud(points=points)
+        return RawCloud(points=points, numbered=numbered)
     if (rest == np.round(rest)).all() and rest.min() >= 0 and 1 < rest.max() <= 255:
-        return RawCloud(points=points, colours=unit_colours(rest, whole=True))
+        return RawCloud(points=points, colours=unit_colours(rest, whole=True), numbered=numbered)
     if np.mean(np.abs(np.linalg.norm(rest, axis=1) - 1.0) < 0.02) > 0.9:
         return from_columns(dict(zip((*XYZ[0], *NORMALS[0]), table.T, strict=True)))
-    return RawCloud(points=points)
+    return RawCloud(points=points, numbered=numbered)

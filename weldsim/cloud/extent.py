@@ -1,0 +1,151 @@
+"""Whether a cloud's size and place fit its unit and the robot: each refusal says what to do, and has tried it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from weldsim.cloud.raw import RawCloud
+from weldsim.errors import CloudError
+from weldsim.records import MILLIMETRE_SPAN, PointCloud
+
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+MIN_SPAN = 0.005  # [m] a cloud smaller than this was scaled down twice, or shows no weld
+MAX_GRAIN = 0.0002  # [m] between neighbouring coordinates of a file in single precision
+FARTHEST = 3.0  # [m] from the base to the nearest point of a cloud: no arm of a welding cell reaches so far
+FARTHEST_CAMERA = 5.0  # [m] from the cloud, or from the base with the cloud seen from there: depth cameras see no groove so far
+ROOM_SPACING = 0.05  # [m] between neighbouring points below which a scan of over 5 m may be one of a room, in metres
+USUAL_SPACING = 0.8e-3  # [m] between neighbouring points of scans of parts
+LEAST_PART, MOST_PART = 0.02, MILLIMETRE_SPAN  # [m] span of what another unit must give to be proposed
+REACH = ((-1.5, -1.5, -0.5), (1.5, 1.5, 1.5))  # [m] corners of the box about the base that is proposed to crop to
+FEWEST_IN_REACH = 100  # points there for it to be proposed
+
+
+def check_grain(path: str, points: Float[ndarray, "n 3"], scale: float) -> None:
+    """Raises CloudError where single precision, so far from the origin, leaves less than the shape of a groove."""
+    reach = float(np.abs(points).max())
+    grain = float(np.spacing(np.float32(min(reach, 1e30)))) * scale
+    if grain > MAX_GRAIN and (points.astype(np.float32) == points).all():
+        raise CloudError(
+            f"{path}: its single-precision coordinates reach {reach * scale:.3g} m, where they lie {grain * 1e3:.2g} mm apart"
+            f" (limit {MAX_GRAIN * 1e3:g} mm): subtract the offset before saving, or save doubles",
+            path=path,
+            grain=grain,
+            limit=MAX_GRAIN,
+        )
+
+
+def check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: int, raw: RawCloud) -> None:
+    """Raises CloudError when the extent shows that the unit is wrong, or that the cloud must be cropped.
+
+    Args:
+        points: (n, 3) [m], read in `unit`.  dropped: points that were not finite.  raw: what the file said of itself.
+    """
+    span = float(np.ptp(points, axis=0).max())
+    left_out = f" ({dropped} points that are not finite left out)" if dropped else ""
+    if span > MILLIMETRE_SPAN:
+        advice = _too_wide(points, unit, span, raw)
+        raise CloudError(
+            f"{path}: spans {span:.4g} m read in {unit} (limit {MILLIMETRE_SPAN:g} m){left_out}; {advice}", path=path, span=span
+        )
+    if unit != "m" and 0 < span < MIN_SPAN:
+        advice = "its header names that unit: correct it" if raw.unit is not None else "it looks like metres: pass --units m"
+        raise CloudError(
+            f"{path}: spans {span * 1e3:.3g} mm read in {unit} (least {MIN_SPAN * 1e3:g} mm){left_out}; {advice}",
+            path=path,
+            span=span,
+        )
+
+
+def cropped_to(box: tuple[Sequence[float], Sequence[float]], points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
+    """Which points (n,) lie in a box given by its corners, edges included."""
+    low, high = np.array(box[0], float), np.array(box[1], float)
+    x, y, z = ((points >= low) & (points <= high)).T
+    return x & y & z
+
+
+def _too_wide(points: Float[ndarray, "n 3"], unit: str, span: float, raw: RawCloud) -> str:
+    """What to do about a cloud of more than MILLIMETRE_SPAN."""
+    if raw.numbered:
+        return "what was read as x counts the rows: name the columns in a first line (id x y z, say)"
+    low, high = np.percentile(points[:: max(1, len(points) // 20_000)], [2, 98], axis=0)
+    bulk = float((high - low).max())
+    if bulk <= MILLIMETRE_SPAN / 2:
+        return f"96 % of the points lie within {bulk:.3g} m: remove the stray ones{_crop(points)}"
+    spacing = _spacing(points)
+    if raw.unit is None and unit == "m" and (guess := _unit_of_part(span, spacing)) is not None:
+        name = {"mm": "millimetres", "cm": "centimetres", "in": "inches"}[guess]
+        if spacing >= ROOM_SPACING:
+            return f"it looks like {name}: pass --units {guess}"
+        return f"crop it to the workpiece{_crop(points)}; or pass --units {guess} if its numbers are {name}"
+    return f"crop it to the workpiece{_crop(points)}" + ("" if unit == "m" else ", or correct its unit")
+
+
+def _crop(points: Float[ndarray, "n 3"]) -> str:
+    """The option that keeps what the arm can reach, where there is something; else nothing."""
+    if int(cropped_to(REACH, points).sum()) < FEWEST_IN_REACH:
+        return ""
+    low, high = ("[" + ",".join(f"{value:g}" for value in corner) + "]" for corner in REACH)
+    return f" (--set cloud.crop_min={low} --set cloud.crop_max={high} keeps what an arm at the origin reaches)"
+
+
+def _unit_of_part(span: float, spacing: float) -> str | None:
+    """The unit in which points of this span and spacing, both read in metres, are most like the scan of a part."""
+    fits = [name for name in ("mm", "cm", "in") if LEAST_PART <= span * METRES[name] <= MOST_PART]
+    if spacing < ROOM_SPACING:
+        fits = [name for name in fits if spacing * METRES[name] > 0.1 * USUAL_SPACING]
+    return min(fits, key=lambda name: abs(np.log(spacing * METRES[name] / USUAL_SPACING)), default=None)
+
+
+def _spacing(points: Float[ndarray, "n 3"]) -> float:
+    """Median distance from a point to its nearest neighbour [m]."""
+    from scipy.spatial import KDTree  # reading a good cloud never needs it
+
+    looks = points[:: max(1, len(points) // 2_000)]
+    distance, _ = KDTree(points).query(looks, k=2)
+    return max(float(np.median(distance[:, 1])), 1e-9)
+
+
+def check_viewpoints(path: str, points: Float[ndarray, "n 3"], viewpoints: Float[ndarray, "k 3"], *, option: bool) -> None:
+    """Raises CloudError where a camera stood so far from the cloud that its position must be in another unit or frame.
+
+    Args:
+        points: (n, 3) [m].  viewpoints: (k, 3) [m].  option: whether --viewpoint gave it, rather than the file.
+    """
+    if len(viewpoints) == 0:
+        return
+    low, high = points.min(axis=0), points.max(axis=0)
+    away = np.linalg.norm(viewpoints - np.clip(viewpoints, low, high), axis=1)
+    worst = int(away.argmax())
+    if away[worst] <= FARTHEST_CAMERA:
+        return
+    shown = " ".join(f"{value:g}" for value in viewpoints[worst])
+    name = f"--viewpoint {shown}" if option else f"{path}: the viewpoint in it, ({shown.replace(' ', ', ')}) m,"
+    advice = "is it in the cloud's frame?" if option else "--viewpoint X Y Z says where the camera stood, in metres"
+    for unit, meant in (("mm", "millimetres"), ("cm", "centimetres"), ("in", "inches")):
+        scaled = viewpoints[worst] * METRES[unit]
+        if np.linalg.norm(scaled - np.clip(scaled, low, high)) <= MILLIMETRE_SPAN / 2:
+            x, y, z = (f"{value:.6g}" for value in scaled)
+            advice = f"looks like {meant}; it is in metres whatever the cloud's unit: --viewpoint {x} {y} {z}"
+            break
+    raise CloudError(
+        f"{name} is {away[worst]:.4g} m from the cloud (limit {FARTHEST_CAMERA:g} m): {advice}",
+        path=path,
+        distance=float(away[worst]),
+        limit=FARTHEST_CAMERA,
+    )
+
+
+def check_reach(cloud: PointCloud) -> None:
+    """Raises CloudError for a cloud in the robot base that lies where no arm reaches."""
+    if not len(cloud):
+        return
+    nearest = float(np.sqrt(np.einsum("ij,ij->i", cloud.points, cloud.points).min()))
+    if nearest > FARTHEST:
+        raise CloudError(
+            f"the cloud's nearest point is {nearest:.4g} m from the robot's base (limit {FARTHEST:g} m): nothing an arm reaches;"
+            " its points must be in the frame of the robot's base, in metres",
+            distance=nearest,
+            limit=FARTHEST,
+        )
