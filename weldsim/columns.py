@@ -66,7 +66,7 @@ class TextTable:
         delimiter: between cells; None is white space.
         decimal_comma: whether a comma is a decimal point.
         width: how many cells the first row has.
-        names: of the columns, one each; None where no line names them.
+        names: of the columns, one each (but see `doubled`); None where no line names them.
     """
 
     first: int
@@ -74,6 +74,11 @@ class TextTable:
     decimal_comma: bool
     width: int
     names: tuple[ColumnName, ...] | None
+
+    @property
+    def doubled(self) -> bool:
+        """Whether rows between commas have twice as many cells as there are names: their decimal points are commas too."""
+        return self.names is not None and self.delimiter == "," and self.width == 2 * len(self.names)
 
     def cells(self, line: str) -> list[str]:
         """The cells of a row, without comment and quotes, numbers with decimal points."""
@@ -282,6 +287,8 @@ def _aligned(names: tuple[ColumnName, ...], rows: Sequence[str], delimiter: str 
         first = [split(_TRAILING.sub("", row), delimiter)[:1] for row in rows if row.strip() and not is_comment(row)]
         if not all(cell and is_number(cell[0]) for cell in first) or counts([float(cell[0]) for cell in first]):
             names = (ColumnName("", "other", None), *names)
+    if delimiter == "," and width == 2 * len(names):
+        return names
     unnamed = [ColumnName("", "other", None)] * (width - len(names))
     return (*names, *unnamed)[:width]
 

@@ -90,6 +90,8 @@ def _columns(table: TextTable, rows: Sequence[str]) -> tuple[dict[str, int], dic
         numbers = next((i for i, cell in enumerate(cells[start:]) if not is_number(cell)), len(cells) - start)
         _check_decimals(table, rows)
         return {str(i): start + i for i in range(6 if numbers == 6 else 3)}, {}
+    if table.doubled:
+        raise Unreadable("its rows have twice as many columns as there are names: with decimal commas put ; between the columns")
     try:
         found = by_role(table.names)
     except ValueError as error:

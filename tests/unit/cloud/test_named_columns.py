@@ -63,6 +63,8 @@ def test_decimal_commas_between_commas_are_refused_and_semicolons_help(tmp_path:
     with pytest.raises(CloudFileError, match=r"decimal commas.*put ; between"):
         read_cloud(path)
     assert len(read_cloud(written(path, "# none", [X, Y, Z / 10], ";", ","))) == 150
+    with pytest.raises(CloudFileError, match=r"twice as many columns as there are names.*put ; between"):
+        read_cloud(written(path, "x,y,z", [X, Y, Z], ",", ","))
 
 
 @pytest.mark.parametrize("header", ["Depth,Y,X", "u,v,w", "left,right,up", "x,y,height_above", "a_x,b_x,z"])

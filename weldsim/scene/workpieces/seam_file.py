@@ -1,6 +1,5 @@
 """The seam of one's own part: a text file of points on the groove's opening, in order."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,11 +7,13 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.columns import AXES, NORMALS, UNITS, ColumnName, TextTable, by_role, decode, find_table, is_comment, is_number
 from weldsim.errors import SceneError
 
-COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "width")
-UNNAMED = {3: COLUMNS[:3], 4: ("x", "y", "z", "width"), 6: COLUMNS[:6], 7: COLUMNS}
+COLUMNS = (*AXES, *NORMALS, "width")
+UNNAMED = {3: AXES, 4: (*AXES, "width"), 6: COLUMNS[:6], 7: COLUMNS}
 MOST = 100_000  # lines
+WANTED = "wanted are x, y, z, and perhaps nx, ny, nz and width"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -34,87 +35,128 @@ def read_seam_file(path: Path, scale: float) -> SeamFile:
     """The seam in a CSV file: x, y, z on each line, optionally nx, ny, nz (the surface's outward normal) and width.
 
     Columns may be named on the first line, then in any order; without names they are x y z, x y z width, x y z nx ny nz, or
-    x y z nx ny nz width. Commas, semicolons or white space part them; what follows a # is a comment.
+    x y z nx ny nz width. Semicolons, tabs, commas or white space part them; a comma is a decimal one where it is not what
+    parts. A unit after a name (`x [mm]`) outranks `scale`. Comments are passed over, whatever they begin with.
 
     Args:
         path: of the file.  scale: metres per unit of its lengths.
     Raises:
         SceneError: a file that is missing, no text, or malformed (with the line), or fewer than two different points.
     """
-    rows, names = [], None
-    for number, line in enumerate(_lines(path), start=1):
-        cells = [cell for cell in re.split(r"[,;\s]+", line.partition("#")[0].strip()) if cell]
-        if not cells:
-            continue
-        if names is None:
-            names = _names(path, number, cells)
-            if names[0] in cells:
-                continue
-        rows.append(_row(path, number, cells, names))
-    if names is None or not rows:
+    lines = _lines(path)
+    table = find_table(lines, least=1)
+    if table is None:
+        _refuse_names(path, lines)
         raise SceneError(f"{path}: no points; a seam needs two, x, y, z on each line", path=str(path))
-    table = np.array(rows)
-    moved = np.concatenate([[True], np.linalg.norm(np.diff(table[:, [names.index(c) for c in "xyz"]], axis=0), axis=1) > 0])
-    table = table[moved]
-    if len(table) < 2:
+    column, scales = _columns(path, table, scale)
+    rows = [_row(path, number, line, table, column) for number, line in enumerate(lines[table.first :], table.first + 1)]
+    numbers = np.array([row for row in rows if row is not None])
+    points = np.stack([numbers[:, i] * scales[name] for i, name in enumerate(column) if name in AXES], axis=1)
+    _refuse_commas(path, table, numbers, column)
+    moved = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0])
+    numbers, points = numbers[moved], points[moved]
+    if len(points) < 2:
         raise SceneError(f"{path}: its points are all the same; a seam needs two", path=str(path))
-    column = {name: table[:, i] for i, name in enumerate(names)}
-    normals = np.stack([column[c] for c in ("nx", "ny", "nz")], axis=1) if "nx" in column else None
+    values = {name: numbers[:, i] for i, name in enumerate(column)}
+    normals = np.stack([values[name] for name in NORMALS], axis=1) if "nx" in values else None
     if normals is not None and not (np.linalg.norm(normals, axis=1) > 1e-6).all():
         raise SceneError(f"{path}: a normal is zero", path=str(path), key="nx")
-    width = column["width"] * scale if "width" in column else None
+    width = values["width"] * scales["width"] if "width" in values else None
     if width is not None and not (width > 0).all():
         raise SceneError(f"{path}: a width is not positive", path=str(path), key="width")
-    return SeamFile(points=np.stack([column[c] for c in "xyz"], axis=1) * scale, normals=normals, width=width)
+    return SeamFile(points=points, normals=normals, width=width)
 
 
 def _lines(path: Path) -> list[str]:
     """The file's lines. Raises SceneError."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        data = path.read_bytes()
     except FileNotFoundError:
         raise SceneError(f"mesh.seam {path}: no such file", path=str(path), key="seam") from None
     except OSError as error:
         raise SceneError(f"mesh.seam {path}: cannot be read ({error.strerror})", path=str(path), key="seam") from None
-    except UnicodeDecodeError:
-        raise SceneError(f"mesh.seam {path}: is no text", path=str(path), key="seam") from None
+    text = decode(data)
+    if "\0" in text:
+        raise SceneError(f"mesh.seam {path}: is no text", path=str(path), key="seam")
+    lines = text.split("\n")
     if len(lines) > MOST:
         raise SceneError(f"mesh.seam {path}: {len(lines)} lines; at most {MOST} are read", path=str(path), limit=MOST)
     return lines
 
 
-def _names(path: Path, number: int, cells: list[str]) -> list[str]:
-    """The columns' names: those on the first line where it has some, else by their number."""
-    try:
-        [float(cell) for cell in cells]
-    except ValueError:
-        named = [cell.strip("\"'").lower() for cell in cells]
-        wrong = [name for name in named if name not in COLUMNS]
-        complete = {"x", "y", "z"} <= set(named) and len({"nx", "ny", "nz"} & set(named)) in (0, 3)
-        if wrong or not complete or len(set(named)) < len(named):
+def _columns(path: Path, table: TextTable, scale: float) -> tuple[dict[str, int], dict[str, float]]:
+    """Where each column stands, axes first and in order, and the metres per unit of those that are lengths."""
+    if table.names is None:
+        if table.width not in UNNAMED:
             raise SceneError(
-                f"{path}, line {number}: columns {', '.join(cells)[:60]!r}; wanted are x, y, z, and perhaps nx, ny, nz and width",
+                f"{path}, line {table.first + 1}: {table.width} columns; wanted are 3 (x y z), 4 (and width), 6 (x y z nx ny nz)"
+                " or 7",
                 path=str(path),
-                allowed=COLUMNS,
-            ) from None
-        cells[:] = named
-        return named
-    if len(cells) not in UNNAMED:
-        raise SceneError(
-            f"{path}, line {number}: {len(cells)} columns; wanted are 3 (x y z), 4 (and width), 6 (x y z nx ny nz) or 7",
-            path=str(path),
-            allowed=tuple(UNNAMED),
-        )
-    return list(UNNAMED[len(cells)])
+                allowed=tuple(UNNAMED),
+            )
+        return {name: i for i, name in enumerate(UNNAMED[table.width])}, dict.fromkeys(COLUMNS, scale)
+    if table.doubled:
+        raise SceneError(f"{path}: twice as many columns as names: with decimal commas put ; between the columns", path=str(path))
+    found = _named(path, table.names)
+    scales = {name: _scale(path, table.names[at], scale) for name, at in found.items() if name not in NORMALS}
+    return found, scales
 
 
-def _row(path: Path, number: int, cells: list[str], names: list[str]) -> list[float]:
-    if len(cells) != len(names):
-        raise SceneError(f"{path}, line {number}: {len(cells)} columns, {len(names)} before", path=str(path), line=number)
+def _named(path: Path, names: tuple[ColumnName, ...]) -> dict[str, int]:
+    listed = ", ".join(name.text for name in names)[:60]
     try:
-        row = [float(cell) for cell in cells]
+        found = by_role(names)
     except ValueError:
-        raise SceneError(f"{path}, line {number}: {' '.join(cells)[:60]!r} are no numbers", path=str(path), line=number) from None
+        found = {}
+    roles = [name.role for name in names if name.role not in ("other", "red", "green", "blue")]
+    if not found or None in roles or len(set(roles)) < len(roles) or len(set(NORMALS) & set(roles)) not in (0, 3):
+        raise SceneError(f"{path}: columns {listed!r}; {WANTED}", path=str(path), allowed=COLUMNS)
+    return {name: found[name] for name in COLUMNS if name in found}
+
+
+def _scale(path: Path, name: ColumnName, scale: float) -> float:
+    """Metres per unit of a column. Raises SceneError for a unit that is no length."""
+    if name.unit is None:
+        return scale
+    if name.unit not in UNITS:
+        raise SceneError(
+            f"{path}: column {name.text[:40]!r} is in {name.unit[:20]}; lengths are in m, cm, mm or in", path=str(path)
+        )
+    return UNITS[name.unit]
+
+
+def _row(path: Path, number: int, line: str, table: TextTable, column: dict[str, int]) -> list[float] | None:
+    """The numbers of a line in the order of `column`; None for a blank line or a comment."""
+    if not line.strip() or is_comment(line) or not (cells := table.cells(line)):
+        return None
+    if len(cells) != table.width:
+        raise SceneError(f"{path}, line {number}: {len(cells)} columns, {table.width} before", path=str(path), line=number)
+    wanted = [cells[at] for at in column.values()]
+    if not all(map(is_number, wanted)):
+        raise SceneError(f"{path}, line {number}: {' '.join(cells)[:60]!r} are no numbers", path=str(path), line=number)
+    row = [float(cell) for cell in wanted]
     if not np.isfinite(row).all():
         raise SceneError(f"{path}, line {number}: a number that is not finite", path=str(path), line=number)
     return row
+
+
+def _refuse_names(path: Path, lines: list[str]) -> None:
+    """Raises SceneError where a line of names stands above no rows that could be read."""
+    left = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]
+    if len(left) > 1:
+        number, line = left[1]
+        raise SceneError(f"{path}, line {number}: {line.strip()[:60]!r} are no numbers; {WANTED}", path=str(path), line=number)
+
+
+def _refuse_commas(path: Path, table: TextTable, numbers: Float[ndarray, "n k"], column: dict[str, int]) -> None:
+    """Raises SceneError where six whole numbers between commas are x, y, z with decimal commas rather than a point and a normal."""
+    if table.names is not None or table.delimiter != "," or len(column) != 6 or (numbers != np.round(numbers)).any():
+        return
+    length = np.linalg.norm(numbers[:, 3:], axis=1)
+    if (numbers[:, 1::2] >= 0).all() and (length > 1.01).any():
+        raise SceneError(
+            f"{path}, line {table.first + 1}: six whole numbers, of which the last three are no unit normal: with decimal commas put"
+            " ; between the columns",
+            path=str(path),
+            line=table.first + 1,
+        )
