@@ -85,9 +85,8 @@ class Run(ConfigOptions):
         if self.json:
             self._print_json(result.report, limits, written)
         else:
-            self._print(
-                result.report, limits, len(result.plan.findings.seams), written, result.motion.notes if result.motion else ()
-            )
+            notes = (*result.world.workpiece.notes, *(result.motion.notes if result.motion else ()))
+            self._print(result.report, limits, len(result.plan.findings.seams), written, notes)
         return 0 if result.report.passed else 1
 
     def scene_config(self) -> Any:

@@ -67,13 +67,14 @@ class Scan(ConfigOptions):
         written = [str(path) for path in (self.out, *files) if path is not None]
         if self.json:
             what = {"scene": scene.name, "seed": self.seed, "sensor": self.sensor, "views": len(captures), "points": len(cloud)}
+            what |= {"notes": list(seen.world.workpiece.notes)}
             lined_up = None if found is None else asdict(found)
             print_json({**what, "viewpoints": cloud.viewpoints.tolist(), "lined_up": lined_up, "written": written})
             return 0
         print(f"{scene.name}, seed {self.seed}, {captures[0].frame.source}: {len(cloud)} points from {len(captures)} view(s)")
         for i, (x, y, z) in enumerate(cloud.viewpoints, start=1):
             print(f"  view {i} from ({x:.4f}, {y:.4f}, {z:.4f}) m in the base")
-        for line in lines(found):
+        for line in (*seen.world.workpiece.notes, *lines(found)):
             print(f"  {line}")
         for name in written:
             print(f"  wrote {name}")

@@ -74,6 +74,7 @@ def test_names_are_believed(tmp_path: Path, head: str, columns: list) -> None:
 def test_a_unit_in_a_name_outranks_the_meshs(tmp_path: Path) -> None:
     seam = read(tmp_path / "s.csv", "x [m],y [cm],z,width [m]\n0,1,20,0.014\n0.1,1,20,0.014\n")
     np.testing.assert_allclose(seam.points, [[0, 0.01, 0.02], [0.1, 0.01, 0.02]])
+    assert seam.width is not None
     np.testing.assert_allclose(seam.width, [0.014, 0.014])
     with pytest.raises(SceneError, match=r"column 'x \[deg\]' is in deg"):
         read(tmp_path / "s.csv", "x [deg],y,z\n0,1,20\n1,1,20\n")

@@ -144,6 +144,11 @@ class Workpiece(ABC):
     def content(self) -> str:
         """Text that is equal for equal geometry: the key under which its mesh is cached."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What people should know of how it was made, one sentence each."""
+        return ()
+
     @abstractmethod
     def build_mesh(self) -> LabelledMesh:
         """The solid, computed afresh."""

@@ -155,8 +155,8 @@ def _refuse_commas(path: Path, table: TextTable, numbers: Float[ndarray, "n k"],
     length = np.linalg.norm(numbers[:, 3:], axis=1)
     if (numbers[:, 1::2] >= 0).all() and (length > 1.01).any():
         raise SceneError(
-            f"{path}, line {table.first + 1}: six whole numbers, of which the last three are no unit normal: with decimal commas put"
-            " ; between the columns",
+            f"{path}, line {table.first + 1}: six whole numbers, of which the last three are no unit normal: with decimal commas"
+            " put ; between the columns",
             path=str(path),
             line=table.first + 1,
         )

@@ -13,14 +13,14 @@ from weldsim.curves import arc_length, interpolate, project, resample, tangents
 from weldsim.errors import SceneError
 from weldsim.frames import unit
 from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCurve, Workpiece
+from weldsim.scene.workpieces.mesh_file import read_mesh_file
 from weldsim.scene.workpieces.seam_file import SeamFile, read_seam_file
 from weldsim.scene.workpieces.solid import SWEEP_STEP
 from weldsim.scene.workpieces.triangles import column_runs, distance_to_faces, ray_lengths
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254}
-SUFFIXES = (".stl", ".obj", ".ply")
+READING = "mesh file/2"  # change it when files are read otherwise, so that kept meshes of old readings are left alone
 LARGEST, SMALLEST = 2.0, 0.005  # [m] of a part's longest side: beyond, its unit must be wrong
-MOST_FACES = 200_000
 NEAR = 0.010  # [m] a seam of unknown width may be so far from the part's surface
 EVERY = 4  # samples of a seam between looks at the surface beside it
 COLUMNS = 24  # of boxes to collide with, along the part's longer side
@@ -50,6 +50,7 @@ class UserMesh(Workpiece):
         title: name of the file.  digest: of both files' contents and the unit.
         vertices, faces: of the closed surface, in P [m].
         curve: its seam, where it is known.  width: between the lips at the samples of the seam, where that is known [m].
+        mended: what was mended in the file, one sentence each.
     """
 
     title: str
@@ -58,6 +59,11 @@ class UserMesh(Workpiece):
     faces: Int[ndarray, "f 3"]
     curve: SeamCurve | None
     width: Float[ndarray, "n"] | None
+    mended: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self.mended
 
     @property
     def name(self) -> str:
@@ -124,14 +130,14 @@ def make_user_mesh(config: MeshConfig) -> UserMesh:
             speaks of another unit, or a seam that lies off the part.
     """
     path, scale = Path(config.file), METRES[config.units]
-    vertices, faces, content = _read_mesh(path)
-    vertices = vertices * scale
+    mesh = read_mesh_file(path)
+    vertices, faces, notes = mesh.vertices * scale, mesh.faces, mesh.notes
     _check_size(path, vertices, config.units)
-    digest = hashlib.sha256(content + config.units.encode())
+    digest = hashlib.sha256(READING.encode() + mesh.content + config.units.encode())
     if config.seam is None:
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         origin = np.array([*(low + high)[:2] / 2, high[2]])
-        return UserMesh(path.stem, digest.hexdigest(), vertices - origin, faces, None, None)
+        return UserMesh(path.stem, digest.hexdigest(), vertices - origin, faces, None, None, notes)
     seam = read_seam_file(Path(config.seam), scale)
     digest.update(Path(config.seam).read_bytes())
     _check_near(Path(config.seam), seam, vertices, faces)
@@ -139,46 +145,7 @@ def make_user_mesh(config: MeshConfig) -> UserMesh:
     origin = middle[len(middle) // 2]
     vertices = vertices - origin
     curve, width = _curve(path.stem, replace(seam, points=seam.points - origin), vertices, faces)
-    return UserMesh(path.stem, digest.hexdigest(), vertices, faces, curve, width)
-
-
-def _read_mesh(path: Path) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"], bytes]:
-    """Vertices in the file's unit, outward faces, and the file's bytes."""
-    import trimesh
-
-    if path.suffix.lower() not in SUFFIXES:
-        raise SceneError(
-            f"mesh.file {path}: {path.suffix or 'no suffix'}; known are {', '.join(SUFFIXES)}", path=str(path), allowed=SUFFIXES
-        )
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise SceneError(f"mesh.file {path}: no such file", path=str(path), key="file") from None
-    except OSError as error:
-        raise SceneError(f"mesh.file {path}: cannot be read ({error.strerror})", path=str(path), key="file") from None
-    try:
-        mesh = trimesh.load_mesh(str(path), process=True)
-    except Exception as error:  # its readers raise whatever the bytes lead them to
-        raise SceneError(
-            f"mesh.file {path}: no {path.suffix[1:].upper()} ({type(error).__name__}: {error})", path=str(path)
-        ) from None
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
-        raise SceneError(f"mesh.file {path}: holds no triangles", path=str(path), key="file")
-    if len(mesh.faces) > MOST_FACES:
-        raise SceneError(
-            f"mesh.file {path}: {len(mesh.faces)} triangles; at most {MOST_FACES} are drawn, so decimate it", limit=MOST_FACES
-        )
-    if not mesh.is_watertight or not mesh.is_winding_consistent:
-        edges = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
-        raise SceneError(
-            f"mesh.file {path}: is not closed: {int((edges != 2).sum())} of its {len(edges)} edges have not two faces of one"
-            " winding; close it (fill holes, merge vertices) where it was made",
-            path=str(path),
-            key="file",
-        )
-    if mesh.volume < 0:
-        mesh.invert()
-    return np.array(mesh.vertices, float), np.array(mesh.faces, np.int64), content
+    return UserMesh(path.stem, digest.hexdigest(), vertices, faces, curve, width, notes)
 
 
 def _check_size(path: Path, vertices: Float[ndarray, "v 3"], units: str) -> None:

@@ -1,0 +1,171 @@
+"""The closed surface in a mesh file: STL, OBJ or PLY, with vertices merged by place and every body's faces outward."""
+
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from weldsim.columns import decode
+from weldsim.errors import SceneError
+from weldsim.scene.workpieces.ply_faces import read_ply_mesh
+from weldsim.scene.workpieces.polygons import triangulated
+from weldsim.scene.workpieces.shells import Broken, Shells, outward
+
+SUFFIXES = (".stl", ".obj", ".ply")
+MOST_FACES = 200_000
+SAME_PLACE = 1e-6  # of the part's longest side: vertices nearer to one another are one, where exact places leave it open
+_COMMA = re.compile(rb"(?<=\d),(?=\d)")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MeshFile:
+    """What a mesh file holds.
+
+    Attributes:
+        vertices: (v, 3) in the file's unit.  faces: (f, 3) outward, closed.
+        content: the file's bytes.
+        notes: what was mended, one sentence each, for people.
+    """
+
+    vertices: Float[ndarray, "v 3"]
+    faces: Int[ndarray, "f 3"]
+    content: bytes
+    notes: tuple[str, ...]
+
+
+def read_mesh_file(path: Path) -> MeshFile:
+    """The surface in a file. Normals, textures, materials and groups are passed over; faces of many corners are cut in triangles.
+
+    Raises:
+        SceneError: a file that is missing, of another kind or unreadable, without triangles, with too many, or whose surface is
+            not closed.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise SceneError(
+            f"mesh.file {path}: {path.suffix or 'no suffix'}; known are {', '.join(SUFFIXES)}", path=str(path), allowed=SUFFIXES
+        )
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise SceneError(f"mesh.file {path}: no such file", path=str(path), key="file") from None
+    except OSError as error:
+        raise SceneError(f"mesh.file {path}: cannot be read ({error.strerror})", path=str(path), key="file") from None
+    try:
+        vertices, faces = _read_any(content, path.suffix.lower())
+    except Exception as error:  # readers raise whatever the bytes lead them to
+        raise SceneError(
+            f"mesh.file {path}: no {path.suffix[1:].upper()} ({type(error).__name__}: {error})", path=str(path)
+        ) from None
+    if len(faces) == 0 or not np.isfinite(vertices).all():
+        raise SceneError(f"mesh.file {path}: holds no triangles", path=str(path), key="file")
+    if len(faces) > MOST_FACES:
+        raise SceneError(
+            f"mesh.file {path}: {len(faces)} triangles; at most {MOST_FACES} are drawn, so decimate it", limit=MOST_FACES
+        )
+    try:
+        vertices, shells = _closed(vertices, faces)
+    except Broken as error:
+        raise SceneError(f"mesh.file {path}: {error}", path=str(path), key="file") from None
+    return MeshFile(vertices=vertices, faces=shells.faces, content=content, notes=tuple(f"{path.name}: {n}" for n in shells.notes))
+
+
+def _closed(vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]) -> tuple[Float[ndarray, "w 3"], Shells]:
+    """The surface made of as few changes as close it: none, vertices merged by place, without inner walls, places rounded.
+
+    Raises:
+        Broken: none of them does; the reason is that of the merged surface.
+    """
+    reason = None
+    tolerance = SAME_PLACE * float(np.ptp(vertices, axis=0).max())
+    for change in (lambda: (vertices, faces), lambda: _merged(vertices, faces), lambda: _without_walls(*_merged(vertices, faces)),
+                   lambda: _merged(*_merged(vertices, faces), tolerance)):  # fmt: skip
+        changed, kept = change()
+        if len(kept) == 0:
+            continue
+        try:
+            return changed, outward(changed, kept)
+        except Broken as error:
+            reason = error if changed is not vertices and reason is None else reason
+    raise reason or Broken("holds no triangles")
+
+
+def _without_walls(
+    vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]
+) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "g 3"]]:
+    """Without pairs of faces on the same three vertices: the wall between two bodies that stand on one another."""
+    _, which, number = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return vertices, faces[number[which.ravel()] == 1]
+
+
+def _read_any(content: bytes, suffix: str) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"]]:
+    """Vertices and faces, not merged yet. Raises whatever the bytes lead to."""
+    if b"\0" not in content or content.lstrip().startswith(b"ply\nformat ascii"):  # a text
+        content = decode(_COMMA.sub(b".", content)).encode()
+    if suffix == ".obj":
+        return _read_obj(content)
+    if suffix == ".ply":
+        points, polygons = read_ply_mesh(content)
+        return points, triangulated(points, polygons)
+    import trimesh
+
+    mesh = trimesh.load_mesh(io.BytesIO(content), file_type="stl", process=False)
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise TypeError("no mesh")
+    return np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+
+
+def _read_obj(content: bytes) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"]]:
+    """Vertices and faces of an OBJ: `v x y z ...`, `f` with 1/2/3, 1//3 or 1, also counted from the end. Raises ValueError."""
+    vertices: list[list[float]] = []
+    polygons: list[list[int]] = []
+    for number, line in enumerate(content.decode().replace("\\\n", " ").split("\n"), 1):
+        words = line.partition("#")[0].split()
+        if not words or words[0] not in ("v", "f"):
+            continue
+        try:
+            if words[0] == "v":
+                vertices.append([float(word) for word in words[1:4]])
+                if len(words) < 4:
+                    raise ValueError
+            else:
+                corners = [int(word.split("/")[0]) for word in words[1:]]
+                polygons.append([corner - 1 if corner > 0 else len(vertices) + corner for corner in corners])
+                if len(corners) < 3 or 0 in corners or min(polygons[-1]) < 0:
+                    raise ValueError
+        except ValueError:
+            raise ValueError(f"line {number}: {line.strip()[:40]!r}") from None
+    points = np.array(vertices, float).reshape(-1, 3)
+    if polygons and max(map(max, polygons)) >= len(points):
+        raise ValueError(f"a face names vertex {max(map(max, polygons)) + 1} of {len(points)}")
+    return points, triangulated(points, polygons)
+
+
+def _merged(
+    vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"], tolerance: float = 0.0
+) -> tuple[Float[ndarray, "w 3"], Int[ndarray, "g 3"]]:
+    """Vertices at one place made one; faces that lose a corner by it, and second copies of a face, are left out."""
+    unique, which = np.unique(vertices, axis=0, return_inverse=True)
+    which = which.ravel()
+    if tolerance > 0:
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import KDTree
+
+        pairs = KDTree(unique).query_pairs(tolerance, output_type="ndarray")
+        graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(unique), len(unique)))
+        _, group = connected_components(graph, directed=False)
+        _, first = np.unique(group, return_index=True)
+        unique, which = unique[first], group[which]
+    faces = which[faces]
+    corners = np.sort(faces, axis=1)
+    faces = faces[(corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])]
+    lowest = faces.argmin(axis=1)[:, None]
+    turned = np.take_along_axis(faces, (lowest + np.arange(3)) % 3, axis=1)  # the same face begins with any corner
+    _, once = np.unique(turned, axis=0, return_index=True)
+    faces = faces[np.sort(once)]
+    used, index = np.unique(faces, return_inverse=True)
+    return unique[used], index.reshape(-1, 3)
