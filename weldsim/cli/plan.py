@@ -25,7 +25,7 @@ TOLD_REASONS = 3
 class Plan(ConfigOptions):
     """Find the groove in a scan and plan the torch path along it.
 
-    The cloud is a PLY, PCD, XYZ, NPZ or NPY file in the base of the robot, or with --intrinsics a depth image. Without
+    The cloud is a PLY, PCD, XYZ, PTX, NPZ or NPY file in the base of the robot, or with --intrinsics a depth image. Without
     --out nothing is written and a summary is printed.
     """
 
@@ -36,7 +36,7 @@ class Plan(ConfigOptions):
     """Where the camera stood [m]; by default what the file says."""
 
     units: Literal["m", "cm", "mm", "in"] | None = None
-    """Unit of length of the cloud; metres by default."""
+    """Unit of length of the cloud; by default the one that its columns' names give, else metres."""
 
     intrinsics: Path | None = None
     """Camera of a depth image: JSON, TOML or `key: value` lines."""
@@ -129,19 +129,21 @@ class Plan(ConfigOptions):
 
         clock = pipeline.Clock(tell)
         with clock.stage("read"):
-            cloud = self._read()
+            cloud = self._read(config)
         try:
             return pipeline.plan(cloud, config, clock=clock), clock
         except (CloudError, PathError) as error:
             raise type(error)(f"{self.cloud}: {error}", **error.data) from None
 
-    def _read(self) -> "PointCloud":
+    def _read(self, config: "CellConfig") -> "PointCloud":
         """The cloud in the file. Raises CloudFileError, CloudError, ConfigError."""
         from weldsim.cloud.deproject import deproject
         from weldsim.cloud.files import read_cloud, read_depth_frame
 
         if self.intrinsics is None:
-            return read_cloud(self.cloud, unit=self.units or "m", viewpoint=self.viewpoint)
+            box = config.cloud
+            crop = None if box.crop_min is None or box.crop_max is None else (box.crop_min, box.crop_max)
+            return read_cloud(self.cloud, unit=self.units, viewpoint=self.viewpoint, crop=crop)
         count = units.parse(self.depth_unit or "1 mm", "m", where="--depth-unit")
         if not count > 0:
             raise InputError(f"--depth-unit {self.depth_unit}: must be positive", depth_unit=self.depth_unit)

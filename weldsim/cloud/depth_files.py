@@ -1,22 +1,23 @@
 """Recorded depth frames: a 16-bit PNG or an NPY, its intrinsics in a text file, and the camera's pose.
 
-Intrinsics are width, height, fx, fy, cx, cy (or ppx, ppy), or a 3x3 `K` with width and height, as JSON, TOML or
-`key: value` lines, in the convention of OpenCV, ROS and librealsense: the centre of the first pixel is (0, 0).
+Intrinsics are width, height, fx, fy, cx, cy (or ppx, ppy), or a 3x3 `K` with width and height, and the coefficients of the
+lens, as JSON, TOML or `key: value` lines (see `weldsim.cloud.camera_files`).
 A `depth_scale` there [m per count] outranks the caller's. A pose is JSON: `position` [m] and `quaternion_wxyz`, or a 4x4
 `matrix`, of the optical frame in the robot base.
 """
 
-import json
-import tomllib
 import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 from numpy import ndarray
 
 from weldsim.cloud.arrays import read_npy, read_npz
+from weldsim.cloud.camera_files import numbers, read_camera
+from weldsim.cloud.extent import FARTHEST_CAMERA, meant_metres
+from weldsim.cloud.key_values import read_table
 from weldsim.cloud.raw import Unreadable
 from weldsim.cloud.sources import read_bytes
 from weldsim.errors import CloudFileError, RecordError, WeldsimError
@@ -25,7 +26,6 @@ from weldsim.output import write_whole
 from weldsim.records import CameraIntrinsics, DepthFrame
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_MAX_SIDE = 16_384  # [px]
 _MAX_DEPTH = 100.0  # [m] a median beyond it was surely written in millimetres
 
 
@@ -42,30 +42,56 @@ def read_depth_frame(
     Raises:
         CloudFileError: a file is missing, damaged, of another size than the intrinsics say, or holds no depth.
     """
-    table = _table(intrinsics_path)
+    table = read_table(intrinsics_path)
     try:
-        intrinsics, unit = _intrinsics(table), _scale(table, depth_unit)
+        intrinsics, unit = read_camera(table), _scale(table, depth_unit)
     except (Unreadable, RecordError) as error:
         raise CloudFileError(f"{intrinsics_path}: {error}", path=str(intrinsics_path), reason=str(error)) from None
     X_BC = pose if isinstance(pose, Transform) else Transform.identity("BC") if pose is None else read_pose(pose)
+    _check_pose(X_BC, "pose" if pose is None or isinstance(pose, Transform) else str(pose))
     data = read_bytes(path)
     try:
         depth = _metres(_image(data, (intrinsics.height, intrinsics.width)), unit)
+        _check_lens(intrinsics, depth, str(intrinsics_path))
     except Unreadable as error:
         raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
     return DepthFrame(depth=depth, intrinsics=intrinsics, X_BC=X_BC, source=Path(path).name)
 
 
+def _check_pose(X_BC: Transform, where: str) -> None:
+    """Raises CloudFileError for a camera so far from the base that its position must be in another unit."""
+    away = float(np.linalg.norm(X_BC.p))
+    if away <= FARTHEST_CAMERA:
+        return
+    advice = "is it in the frame of the robot's base?"
+    if (told := meant_metres(X_BC.p)) is not None:
+        x, y, z = (f"{value:.6g}" for value in told[1])
+        advice = f"it looks like {told[0]}; positions are in metres: ({x}, {y}, {z})"
+    reason = f"the camera is {away:.4g} m from the robot's base (limit {FARTHEST_CAMERA:g} m): {advice}"
+    raise CloudFileError(f"{where}: {reason}", path=where, reason=reason, distance=away, limit=FARTHEST_CAMERA)
+
+
+def _check_lens(camera: CameraIntrinsics, depth: Float32[ndarray, "h w"], path: str) -> None:
+    """Raises CloudFileError where the lens has no ray for a pixel with depth: its coefficients are of another camera or unit."""
+    if not camera.distortion:
+        return
+    lost = np.isnan(camera.rays()[..., 0]) & np.isfinite(depth)
+    if lost.any():
+        row, column = np.argwhere(lost)[0]
+        reason = f"its lens coefficients fold the image over at pixel ({column}, {row}); check their order (k1 k2 p1 p2 k3)"
+        raise CloudFileError(f"{path}: {reason}", path=path, reason=reason)
+
+
 def read_pose(path: str | Path) -> Transform:
     """X_BC from a JSON file. Raises CloudFileError."""
-    table = _table(path)
+    table = read_table(path)
     try:
         if "position" in table:
-            quaternion, p = _numbers(table, "quaternion_wxyz", (4,)), _numbers(table, "position", (3,))
+            quaternion, p = numbers(table, "quaternion_wxyz", (4,)), numbers(table, "position", (3,))
             if abs(np.linalg.norm(quaternion) - 1.0) > 0.01:
                 raise Unreadable(f"its quaternion_wxyz has length {np.linalg.norm(quaternion):.3g}, not 1")
             return Transform.from_quaternion("BC", quaternion, p)
-        matrix = _numbers(table, "matrix", (4, 4))
+        matrix = numbers(table, "matrix", (4, 4))
         u, _, vt = np.linalg.svd(matrix[:3, :3])
         if np.abs(u @ vt - matrix[:3, :3]).max() > 1e-3 or np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
             raise Unreadable("its matrix is no rigid transform")
@@ -88,72 +114,8 @@ def write_depth_png(path: str | Path, depth: Float32[ndarray, "h w"], *, depth_u
 # Text ---------------------------------------------------------------------------------------------------------------
 
 
-def _table(path: str | Path) -> dict[str, Any]:
-    """The keys of a JSON, TOML or `key: value` file; a bare JSON list is a 4x4 matrix. Raises CloudFileError."""
-    data = read_bytes(path)
-    try:
-        text = data[: 1 << 20].decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise CloudFileError(f"{path}: is no text", path=str(path), reason="not UTF-8") from None
-    for parse in (json.loads, tomllib.loads, _lines):
-        try:
-            parsed = parse(text)
-        except (ValueError, RecursionError):
-            continue
-        if isinstance(parsed, dict) and parsed:
-            return parsed
-        if isinstance(parsed, list):
-            return {"matrix": parsed}
-    raise CloudFileError(f"{path}: is neither JSON nor TOML nor lines of `key: value`", path=str(path), reason="no table")
-
-
-def _lines(text: str) -> dict[str, Any]:
-    """The keys of `key: value` lines; values are JSON, other lines are passed over."""
-    found: dict[str, Any] = {}
-    for line in text.splitlines():
-        key, colon, value = line.partition(":")
-        try:
-            found[key.strip()] = json.loads(value) if colon else None
-        except (ValueError, RecursionError):
-            continue
-    return {key: value for key, value in found.items() if value is not None}
-
-
-def _numbers(table: dict[str, Any], key: str, shape: tuple[int, ...]) -> Float[ndarray, "..."]:
-    """The finite numbers under `key`, in `shape`. Raises Unreadable."""
-    if key not in table:
-        raise Unreadable(f"key {key!r} is missing (found: {', '.join(map(str, table))[:80]})")
-    try:
-        array = np.asarray(table[key], dtype=float)
-    except (ValueError, TypeError, OverflowError):
-        raise Unreadable(f"{key}: {str(table[key])[:40]!r} is no number") from None
-    if array.size != int(np.prod(shape)) or not np.isfinite(array).all():
-        raise Unreadable(f"{key}: {str(table[key])[:40]!r}, expected {int(np.prod(shape))} finite numbers")
-    return array.reshape(shape)
-
-
-def _intrinsics(table: dict[str, Any]) -> CameraIntrinsics:
-    for key in ("D", "coeffs", "distortion", "distortion_coefficients"):
-        if key in table and np.any(np.asarray(table[key], dtype=object) != 0):
-            raise Unreadable(f"{key} is not zero: give a depth image without distortion")
-    if "K" in table:
-        K = _numbers(table, "K", (3, 3))
-        if K[0, 1] != 0 or K[1, 0] != 0 or (K[2] != [0, 0, 1]).any():
-            raise Unreadable("K is no matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
-        fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
-    else:
-        names = ("fx", "fy", "ppx" if "ppx" in table else "cx", "ppy" if "ppy" in table else "cy")
-        fx, fy, cx, cy = (_numbers(table, name, ())[()] for name in names)
-    sides = [float(_numbers(table, name, ())) for name in ("width", "height")]
-    if any(side != round(side) or not 1 <= side <= _MAX_SIDE for side in sides):
-        raise Unreadable(f"width {sides[0]:g} and height {sides[1]:g} are no image size (1 to {_MAX_SIDE} px)")
-    return CameraIntrinsics.from_opencv(
-        width=int(sides[0]), height=int(sides[1]), fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy)
-    )
-
-
 def _scale(table: dict[str, Any], depth_unit: float) -> float:
-    unit = float(_numbers(table, "depth_scale", ())) if "depth_scale" in table else depth_unit
+    unit = float(numbers(table, "depth_scale", ())) if "depth_scale" in table else depth_unit
     if not 1e-9 < unit < 1.0:
         raise Unreadable(f"depth_scale {unit:g} m per count is not between 1e-9 and 1")
     return unit

@@ -36,7 +36,7 @@ def write_depth_frame(path: str | Path, frame: DepthFrame, *, depth_unit: float 
         OutputError: a place that cannot be written.  RecordError: depth that does not fit 16 bits.
     """
     image, intrinsics, pose = depth_file_names(path)
-    table = asdict(frame.intrinsics)
+    table = {key: value for key, value in asdict(frame.intrinsics).items() if value != ()}
     table |= {"cx": frame.intrinsics.cx - 0.5, "cy": frame.intrinsics.cy - 0.5}
     if image.suffix.lower() == ".png":
         write_depth_png(image, frame.depth, depth_unit=depth_unit)

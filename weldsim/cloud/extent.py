@@ -15,6 +15,7 @@ MIN_SPAN = 0.005  # [m] a cloud smaller than this was scaled down twice, or show
 MAX_GRAIN = 0.0002  # [m] between neighbouring coordinates of a file in single precision
 FARTHEST = 3.0  # [m] from the base to the nearest point of a cloud: no arm of a welding cell reaches so far
 FARTHEST_CAMERA = 5.0  # [m] from the cloud, or from the base with the cloud seen from there: depth cameras see no groove so far
+NEAREST_CAMERA = 0.25  # [m] from the base: nearer, the arm is in its way
 ROOM_SPACING = 0.05  # [m] between neighbouring points below which a scan of over 5 m may be one of a room, in metres
 USUAL_SPACING = 0.8e-3  # [m] between neighbouring points of scans of parts
 LEAST_PART, MOST_PART = 0.02, MILLIMETRE_SPAN  # [m] span of what another unit must give to be proposed
@@ -123,18 +124,24 @@ def check_viewpoints(path: str, points: Float[ndarray, "n 3"], viewpoints: Float
     shown = " ".join(f"{value:g}" for value in viewpoints[worst])
     name = f"--viewpoint {shown}" if option else f"{path}: the viewpoint in it, ({shown.replace(' ', ', ')}) m,"
     advice = "is it in the cloud's frame?" if option else "--viewpoint X Y Z says where the camera stood, in metres"
-    for unit, meant in (("mm", "millimetres"), ("cm", "centimetres"), ("in", "inches")):
-        scaled = viewpoints[worst] * METRES[unit]
-        if np.linalg.norm(scaled - np.clip(scaled, low, high)) <= MILLIMETRE_SPAN / 2:
-            x, y, z = (f"{value:.6g}" for value in scaled)
-            advice = f"looks like {meant}; it is in metres whatever the cloud's unit: --viewpoint {x} {y} {z}"
-            break
+    if (told := meant_metres(viewpoints[worst])) is not None:
+        x, y, z = (f"{value:.6g}" for value in told[1])
+        advice = f"it looks like {told[0]}; it is in metres whatever the cloud's unit: --viewpoint {x} {y} {z}"
     raise CloudError(
         f"{name} is {away[worst]:.4g} m from the cloud (limit {FARTHEST_CAMERA:g} m): {advice}",
         path=path,
         distance=float(away[worst]),
         limit=FARTHEST_CAMERA,
     )
+
+
+def meant_metres(position: Float[ndarray, "3"]) -> tuple[str, Float[ndarray, "3"]] | None:
+    """The unit that a camera's position, far too large in metres, looks like, and the position in metres; None for no unit."""
+    away = float(np.linalg.norm(position))
+    for unit, meant in (("mm", "millimetres"), ("cm", "centimetres"), ("in", "inches")):
+        if NEAREST_CAMERA <= away * METRES[unit] <= MILLIMETRE_SPAN / 2:
+            return meant, position * METRES[unit]
+    return None
 
 
 def check_reach(cloud: PointCloud) -> None:

@@ -8,16 +8,18 @@ from numpy import ndarray
 
 from weldsim.frames import Transform
 from weldsim.records.checks import check_metres, check_unit, require, store
+from weldsim.records.lens import COUNTS, undistorted
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CameraIntrinsics:
-    """A pinhole camera. Pixel (u, v) has its centre at (u + 1/2, v + 1/2), so a drivers' OpenCV-style principal point
-    (pixel centres at whole numbers) is half a pixel smaller: use `from_opencv`.
+    """A pinhole camera, or one whose lens distorts. Pixel (u, v) has its centre at (u + 1/2, v + 1/2), so a drivers'
+    OpenCV-style principal point (pixel centres at whole numbers) is half a pixel smaller: use `from_opencv`.
 
     Attributes:
         width, height: image size [px].
         fx, fy: focal lengths [px].  cx, cy: principal point [px], half-pixel convention.
+        distortion: coefficients of the lens in OpenCV's order (`weldsim.records.lens`); none for a pinhole.
     """
 
     width: int
@@ -26,23 +28,30 @@ class CameraIntrinsics:
     fy: float
     cx: float
     cy: float
+    distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         require(self.width > 0 and self.height > 0, self, "width", f"{self.width} x {self.height} is no image size")
         require(bool(np.isfinite([self.fx, self.fy, self.cx, self.cy]).all()), self, "fx", "not finite")
         require(self.fx > 0 and self.fy > 0, self, "fx", f"focal length ({self.fx}, {self.fy}) px must be positive")
+        known = len(self.distortion) in COUNTS and bool(np.isfinite(self.distortion).all())
+        require(known, self, "distortion", f"{self.distortion} are not {', '.join(map(str, COUNTS))} finite coefficients")
 
     @classmethod
-    def from_opencv(cls, *, width: int, height: int, fx: float, fy: float, cx: float, cy: float) -> "CameraIntrinsics":
+    def from_opencv(
+        cls, *, width: int, height: int, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...] = ()
+    ) -> "CameraIntrinsics":
         """From figures as OpenCV, ROS and librealsense print them (pixel centres at whole numbers; thesis eq 5.1)."""
-        return cls(width=width, height=height, fx=fx, fy=fy, cx=cx + 0.5, cy=cy + 0.5)
+        return cls(width=width, height=height, fx=fx, fy=fy, cx=cx + 0.5, cy=cy + 0.5, distortion=distortion)
 
     def rays(self) -> Float[ndarray, "h w 3"]:
-        """Direction of each pixel's ray in C, z = 1 (so depth times ray is the point)."""
+        """Direction of each pixel's ray in C, z = 1 (so depth times ray is the point); NaN where the lens gives a pixel none."""
         u = (np.arange(self.width) + 0.5 - self.cx) / self.fx
         v = (np.arange(self.height) + 0.5 - self.cy) / self.fy
         rays = np.ones((self.height, self.width, 3))
         rays[..., 0], rays[..., 1] = u[None, :], v[:, None]
+        if self.distortion:
+            rays[..., :2] = undistorted(rays[..., :2].reshape(-1, 2), self.distortion).reshape(*rays.shape[:2], 2)
         return rays
 
 

@@ -42,4 +42,4 @@ class ReplaySensor(DepthSensor):
 
 
 def _figures(i: CameraIntrinsics) -> tuple[float, ...]:
-    return (i.width, i.height, i.fx, i.fy, i.cx, i.cy)
+    return (i.width, i.height, i.fx, i.fy, i.cx, i.cy, *i.distortion)

@@ -118,7 +118,6 @@ PNG = png_bytes(COUNTS)
         (PNG, {"width": W, "height": H}, "key 'fx' is missing"),
         (PNG, {"width": W, "height": H, "K": [[1, 2], [3, 4]]}, "expected 9 finite numbers"),
         (PNG, {"width": W, "height": H, "K": np.ones((3, 3)).tolist()}, "K is no matrix"),
-        (PNG, {**FIGURES, "D": [0.1, 0, 0, 0, 0]}, "without distortion"),
         (PNG, "no table here", "neither JSON nor TOML"),
         (PNG, b"\xff\xfe\x00", "is no text"),
     ],
@@ -167,3 +166,20 @@ def test_a_depth_png_reads_back(tmp_path: Path, put) -> None:
     assert cv2.imread(str(path), cv2.IMREAD_UNCHANGED).dtype == np.uint16
     with pytest.raises(RecordError, match="16 bits"):
         write_depth_png(path, depth, depth_unit=1e-6)
+
+
+@pytest.mark.parametrize(("scale", "meant"), [(1e3, "millimetres"), (100.0, "centimetres")])
+def test_a_camera_in_another_unit_is_refused_and_the_metres_that_are_named_work(put, scale: float, meant: str) -> None:
+    depth, k = put(png_bytes(COUNTS), "d"), put(FIGURES, "k")
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])
+    pose[:3, 3] = np.array([0.0, -0.45, 0.42]) * scale
+    with pytest.raises(CloudFileError, match=rf"pose.*looks like {meant}; positions are in metres: \(0, -0.45, 0.42\)"):
+        read_depth_frame(depth, k, pose=put({"matrix": pose.tolist()}, "pose"))
+    pose[:3, 3] = (0, -0.45, 0.42)
+    np.testing.assert_allclose(read_depth_frame(depth, k, pose=put({"matrix": pose.tolist()}, "pose")).X_BC.p, [0, -0.45, 0.42])
+
+
+def test_a_camera_in_another_frame_is_refused(put) -> None:
+    far = {"position": [4e5, 2e6, 1e4], "quaternion_wxyz": [0, 1, 0, 0]}
+    with pytest.raises(CloudFileError, match="is it in the frame of the robot's base"):
+        read_depth_frame(put(png_bytes(COUNTS), "d"), put(FIGURES, "k"), pose=put(far, "pose"))
