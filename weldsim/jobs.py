@@ -46,12 +46,14 @@ class Sighting:
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanResult:
     """What was planned from a cloud. Attributes: cloud, as the seam finder saw it; findings; paths, one for each seam, None
-    where none can be laid; refused, why, by the seam's index; timing, seconds a stage; config_digest."""
+    where none can be laid; refused, why, by the seam's index; notes, for people, one sentence each; timing, seconds a stage;
+    config_digest."""
 
     cloud: PointCloud
     findings: SeamFindings
     paths: tuple[TorchPath | None, ...]
     refused: Mapping[int, PathError] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     timing: dict[str, float]
     config_digest: str
 

@@ -24,6 +24,7 @@ from weldsim.records import ExecutionLog, PointCloud, TorchPath
 from weldsim.report.weld import weld_report
 from weldsim.scan.stand import scan
 from weldsim.seam.find import find_seams
+from weldsim.search import search
 from weldsim.sensor.base import true_region
 from weldsim.sensor.choose import SensorName, posture
 
@@ -149,11 +150,17 @@ def plan(
         cloud = prepare(cloud, config.cloud)
         check_plannable(cloud)
     with clock.stage("seam"):
-        findings = find_seams(cloud, config.seam) if find is None else find(cloud)
+        cloud, findings, notes = search(cloud, partial(find_seams, config=config.seam) if find is None else find)
     with clock.stage("path"):
         paths, refused = plan_paths(findings.seams, config.path)
     return PlanResult(
-        cloud=cloud, findings=findings, paths=paths, refused=refused, timing=clock.seconds, config_digest=digest(config)
+        cloud=cloud,
+        findings=findings,
+        paths=paths,
+        refused=refused,
+        notes=notes,
+        timing=clock.seconds,
+        config_digest=digest(config),
     )
 
 

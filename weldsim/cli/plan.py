@@ -80,7 +80,7 @@ class Plan(ConfigOptions):
                 self._write_report(page, picture, chosen, clock, config)
         if not result.findings.seams:
             raise NoSeamError(
-                f"{self.cloud}: no seam found; {_reasons(result.findings)}{self._viewpoint_hint(result.cloud, config)}",
+                f"{self.cloud}: no seam found; {_reasons(result.findings)}{self._hint(config)}",
                 rejected=[asdict(refused) for refused in result.findings.rejected],
             )
         document = self._document(chosen, numbers, clock)
@@ -106,15 +106,11 @@ class Plan(ConfigOptions):
             page = picture = None  # in a folder still to be made
         check_outputs((self.out, self.csv, page, picture), (self.cloud, self.intrinsics, self.pose, self.config))
 
-    def _viewpoint_hint(self, cloud: "PointCloud", config: "CellConfig") -> str:
-        """What to do where the viewpoint keeps a seam from being found; empty where it does not."""
-        from weldsim.seam.find import seams_without_view
+    def _hint(self, config: "CellConfig") -> str:
+        """What to do where no seam was found; empty where nothing that was tried helps."""
+        from weldsim.hints import hint
 
-        if not len(cloud.viewpoints) or not seams_without_view(cloud, config.seam):
-            return ""
-        stood = " and ".join("({:.3f}, {:.3f}, {:.3f})".format(*point) for point in cloud.viewpoints[:3])
-        option = "--viewpoint X Y Z" if self.intrinsics is None else "--pose"
-        return f"; without the viewpoint {stood} m a groove is there: is that where the camera stood? {option} says otherwise"
+        return hint(self._read(config), config, imaged=self.intrinsics is not None)
 
     def _report_files(self) -> tuple[Path | None, Path | None]:
         """HTML and PNG."""
@@ -211,7 +207,7 @@ class Plan(ConfigOptions):
         from weldsim.path.files import path_text
 
         threshold = result.findings.threshold
-        more: dict[str, Any] = {"rejected": [asdict(refused) for refused in result.findings.rejected]}
+        more: dict[str, Any] = {"rejected": [asdict(refused) for refused in result.findings.rejected], "notes": list(result.notes)}
         if threshold is not None:
             kept = {factor: move if np.isfinite(move) else None for factor, move in threshold.stability.items()}
             more["threshold"] = {**asdict(threshold), "stability": kept}
@@ -245,7 +241,7 @@ class Plan(ConfigOptions):
                 print(
                     f"  seam {number}: {units.to_mm(s0):.0f} to {units.to_mm(s1):.0f} mm not measured, the line is carried across"
                 )
-        for clause in unplanned(chosen):
+        for clause in (*unplanned(chosen), *result.notes):
             print(f"  {clause}")
         print(times(clock.seconds))
         for path in (self.out, self.csv, page):

@@ -1,8 +1,5 @@
 """The seam stage: cloud in, seams out, by the method the config names."""
 
-from dataclasses import replace
-
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from weldsim.records import PointCloud, SeamFindings
@@ -24,11 +21,3 @@ def find_seams(cloud: PointCloud, config: SeamConfig) -> SeamFindings:
     # Its matrices are a few hundred rows: threads of the BLAS library would spend their time waiting for each other.
     with threadpool_limits(1, user_api="blas"):
         return find_seams_profile(cloud, config.profile)
-
-
-def seams_without_view(cloud: PointCloud, config: SeamConfig) -> int:
-    """How many seams there are when nothing is believed of where the camera stood.
-
-    Where there are some and `find_seams` has none, the cloud's viewpoint is wrong: on or under the surface, or in another frame.
-    """
-    return len(find_seams(replace(cloud, viewpoints=np.zeros((0, 3)), view=None), config).seams)

@@ -1,0 +1,136 @@
+"""What may keep a seam from being found, and what to do: each remedy was tried on the very cloud, and found one."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from scipy.spatial import KDTree
+
+from weldsim.cloud.files import check_plannable
+from weldsim.cloud.filters import prepare
+from weldsim.config import CellConfig
+from weldsim.errors import CloudError
+from weldsim.frames import unit
+from weldsim.records import PointCloud
+from weldsim.seam.find import find_seams
+from weldsim.search import CAMERA_FRAME, search
+
+THINNED = 0.002  # [m] between points, from which on narrow grooves do not show
+ACROSS = 5  # points that a groove needs across its width; found at sweeps over the straight and the curved twin: three to six
+WIDEST = 0.014  # [m] of the groove that the spacing needed is told for
+NEAREST = 0.1  # [m] before a depth camera: nearer, it sees nothing
+FLATTEST = 0.25  # sine of the angle between sight and surface: flatter, it sees no groove
+STAND_OFF = 0.45  # [m] of the viewpoint that is tried in place of one that cannot be
+FARTHEST = 2.0  # [m] from a camera at the origin to a cloud in its own frame
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """The plane that most of a cloud lies in: its middle [m], and its normal, upwards."""
+
+    middle: Float[ndarray, "3"]
+    normal: Float[ndarray, "3"]
+
+
+def hint(cloud: PointCloud, config: CellConfig, *, imaged: bool = False) -> str:
+    """What to do about a cloud in which no seam was found, one clause after `; `; empty where nothing that was tried helps.
+
+    A viewpoint that may be right is never doubted: without it a groove's place is off by millimetres.
+
+    Args:
+        cloud: as it was read, before `config.cloud` was applied.  imaged: whether from a depth image, whose viewpoint is right.
+    """
+    if config.cloud.voxel > 0 and _finds(cloud, replace(config, cloud=replace(config.cloud, voxel=0.0))):
+        return f"; without cloud.voxel = {config.cloud.voxel * 1e3:g} mm a seam is found: make it smaller, or leave it out"
+    told = "" if imaged else _of_viewpoint(cloud, config) if len(cloud.viewpoints) == 1 else _of_frame(cloud, config)
+    return told or _of_spacing(cloud)
+
+
+def _of_viewpoint(cloud: PointCloud, config: CellConfig) -> str:
+    """Where the camera cannot have stood where it is said, and from where a seam is found."""
+    (stood,) = cloud.viewpoints
+    if float(np.linalg.norm(stood)) < CAMERA_FRAME:  # the camera's own frame has no upper side
+        return ""
+    plane = _plane(cloud)
+    reason = _impossible(stood, cloud, plane)
+    if reason is None:
+        return ""
+    other = plane.middle + STAND_OFF * plane.normal
+    if not _finds(replace(cloud, viewpoints=other[None], view=None), config):
+        return ""
+    x, y, z = (f"{value:.3f}" for value in other)
+    told = "({:.3f}, {:.3f}, {:.3f})".format(*stood)
+    return f"; the viewpoint {told} m {reason}: is that where the camera stood? From --viewpoint {x} {y} {z} a groove is seen"
+
+
+def _impossible(stood: Float[ndarray, "3"], cloud: PointCloud, plane: _Plane) -> str | None:
+    """Why no camera saw the cloud from there; None where one may have."""
+    nearest = float(KDTree(cloud.points).query(stood)[0])
+    if nearest < NEAREST:
+        return f"is {nearest * 1e3:.0f} mm from the cloud, under {NEAREST * 1e3:.0f} mm"
+    rise = float(unit(stood - plane.middle) @ plane.normal)
+    if rise < -FLATTEST:
+        return "lies below the surface that it saw"
+    if rise < FLATTEST:
+        return (
+            f"sees the surface at {np.degrees(np.arcsin(max(rise, 0.0))):.0f} deg, under {np.degrees(np.arcsin(FLATTEST)):.0f} deg"
+        )
+    return None
+
+
+def _of_frame(cloud: PointCloud, config: CellConfig) -> str:
+    """Whether the cloud is in the frame of the camera that saw it."""
+    if len(cloud.viewpoints):
+        return ""
+    nearest = float(np.sqrt(np.einsum("ij,ij->i", cloud.points, cloud.points).min()))
+    plane = _plane(cloud)
+    sight = unit(-plane.middle)
+    if not NEAREST < nearest < FARTHEST or abs(float(sight @ plane.normal)) < FLATTEST:
+        return ""
+    if not _finds(replace(cloud, viewpoints=np.zeros((1, 3)), view=None), config):
+        return ""
+    return "; with --viewpoint 0 0 0 one is: the cloud looks like one in its camera's own frame, and so would be the path"
+
+
+def _of_spacing(cloud: PointCloud) -> str:
+    """Whether the points lie too far apart for narrow grooves, and how near they must be."""
+    spacing = _spacing(cloud.points)
+    if spacing < THINNED:
+        return ""
+    return (
+        f"; its points lie {spacing * 1e3:.1f} mm apart, and a groove shows with {ACROSS} across its width: one of"
+        f" {WIDEST * 1e3:.0f} mm needs them {WIDEST / ACROSS * 1e3:.1f} mm apart; thin it less, or scan from nearer"
+    )
+
+
+def _spacing(points: Float[ndarray, "n 3"]) -> float:
+    """Distance between points that lay on a square grid as densely [m], from the cubes of a coarse grid that hold any."""
+    size = max(float(np.ptp(points, axis=0).max()) / 48, 1e-6)
+    cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
+    number = np.unique(cell @ np.array([1, 1 << 20, 1 << 40]), return_counts=True)[1]
+    return size / float(np.sqrt(np.median(number)))
+
+
+def _plane(cloud: PointCloud) -> _Plane:
+    """The plane of most points, found again without those that lie off it."""
+    points = cloud.points[:: max(1, len(cloud) // 20_000)]
+    kept = np.ones(len(points), bool)
+    middle, normal = points.mean(axis=0), np.array([0.0, 0.0, 1.0])
+    for _ in range(6):
+        middle = points[kept].mean(axis=0)
+        normal = np.linalg.eigh(np.cov((points[kept] - middle).T))[1][:, 0]
+        off = np.abs((points - middle) @ normal)
+        kept = off <= max(2.5 * float(np.median(off)), 1e-5)
+    leading = normal[2] if abs(normal[2]) > 0.05 else -normal[1]
+    return _Plane(middle, normal if leading >= 0 else -normal)
+
+
+def _finds(cloud: PointCloud, config: CellConfig) -> bool:
+    """Whether a seam is found in the cloud as `weldsim plan` would look for it."""
+    try:
+        cloud = prepare(cloud, config.cloud)
+        check_plannable(cloud)
+    except CloudError:
+        return False
+    return bool(search(cloud, lambda each: find_seams(each, config.seam))[1].seams)
