@@ -105,11 +105,10 @@ def _of_spacing(cloud: PointCloud) -> str:
 
 
 def _spacing(points: Float[ndarray, "n 3"]) -> float:
-    """Distance between points that lay on a square grid as densely [m], from the cubes of a coarse grid that hold any."""
-    size = max(float(np.ptp(points, axis=0).max()) / 48, 1e-6)
-    cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
-    number = np.unique(cell @ np.array([1, 1 << 20, 1 << 40]), return_counts=True)[1]
-    return size / float(np.sqrt(np.median(number)))
+    """Distance between points of a square grid that is as dense as the cloud's surface [m], from the eighth neighbours."""
+    looks = points[:: max(1, len(points) // 2_000)]
+    distance, _ = KDTree(points).query(looks, k=9)
+    return float(np.median(distance[:, -1]) * np.sqrt(np.pi / 8))
 
 
 def _plane(cloud: PointCloud) -> _Plane:

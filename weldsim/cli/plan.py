@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from weldsim.records import PointCloud, SeamFindings
 
 TOLD_REASONS = 3
+DEPTH_UNITS = ("1 mm", "0.1 mm")  # of a count, as depth cameras have them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +130,20 @@ class Plan(ConfigOptions):
         try:
             return pipeline.plan(cloud, config, clock=clock), clock
         except (CloudError, PathError) as error:
-            raise type(error)(f"{self.cloud}: {error}", **error.data) from None
+            hint = self._depth_unit_hint(config) if "distance" in error.data and self.intrinsics is not None else ""
+            raise type(error)(f"{self.cloud}: {error}{hint}", **error.data) from None
+
+    def _depth_unit_hint(self, config: "CellConfig") -> str:
+        """Which unit of a count brings a depth image that lies too far away within reach; empty where none does."""
+        from weldsim.cloud.extent import check_reach
+
+        for unit in DEPTH_UNITS:
+            try:
+                check_reach(replace(self, depth_unit=unit)._read(config))
+            except InputError:
+                continue
+            return f'; with --depth-unit "{unit}" it lies within reach'
+        return ""
 
     def _read(self, config: "CellConfig") -> "PointCloud":
         """The cloud in the file. Raises CloudFileError, CloudError, ConfigError."""

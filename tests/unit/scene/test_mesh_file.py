@@ -98,7 +98,8 @@ def test_an_obj_that_names_no_vertex_is_refused_with_its_line(tmp_path: Path) ->
 def test_a_ply_with_notched_faces_is_the_same_part(tmp_path: Path, order: str, name: str) -> None:
     kind = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
     head = (
-        f"ply\nformat {kind} 1.0\ncomment Gr\u00f6\u00dfe\nelement vertex 14\nproperty float x\nproperty float y\nproperty float z\n"
+        f"ply\nformat {kind} 1.0\ncomment Gr\u00f6\u00dfe\nelement vertex 14\nproperty float x\nproperty float y\n"
+        "property float z\n"
         f"property uchar red\nelement face 9\nproperty list uchar int {name}\nproperty uchar flags\nend_header\n"
     ).encode("latin-1")
     if order == "":

@@ -1,0 +1,53 @@
+"""Advice of `weldsim plan`, followed to the letter at the command line."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cloud_files import png_bytes
+from tests.unit.cloud.test_extent import plate, room
+from weldsim.cli import main
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: object, code: int = 2) -> str:
+    """What a command says that fails with that code, in one line."""
+    assert main(["plan", *map(str, words)]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    return err
+
+
+def test_options_that_crop_a_room_are_taken_as_they_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    np.save(tmp_path / "room.npy", room(0.03, size=6.0))
+    said = refused(capsys, tmp_path / "room.npy")
+    options = re.search(r"\((--set .*?) keeps", said)
+    assert options is not None
+    assert "no seam found" in refused(capsys, tmp_path / "room.npy", *shlex.split(options[1]), code=1)  # read, and a bare plate
+
+
+def test_a_unit_and_a_viewpoint_that_are_proposed_are_taken_as_they_are_printed(tmp_path: Path, capsys) -> None:
+    np.save(tmp_path / "part.npy", plate() * 1e3)
+    unit = re.search(r"pass (--units \w+)", refused(capsys, tmp_path / "part.npy"))
+    assert unit is not None
+    words = [tmp_path / "part.npy", *unit[1].split()]
+    viewpoint = re.search(r"(--viewpoint [-0-9. ]+)$", refused(capsys, *words, "--viewpoint", 0, -450, 420).strip())
+    assert viewpoint is not None
+    assert "no seam found" in refused(capsys, *words, *viewpoint[1].split(), code=1)
+
+
+def test_a_depth_unit_that_is_proposed_is_taken_as_it_is_printed(tmp_path: Path, capsys) -> None:
+    rng = np.random.default_rng(0)
+    (tmp_path / "d.png").write_bytes(png_bytes((4000 + rng.integers(-3, 3, (96, 128))).astype(np.uint16)))  # 0.1 mm a count
+    camera = {"width": 128, "height": 96, "fx": 120.0, "fy": 120.0, "cx": 63.5, "cy": 47.5}
+    (tmp_path / "k.json").write_text(json.dumps(camera))
+    (tmp_path / "pose.json").write_text(json.dumps({"position": [0, -0.45, 0.4], "quaternion_wxyz": [0, 1, 0, 0]}))
+    words = [tmp_path / "d.png", "--intrinsics", tmp_path / "k.json", "--pose", tmp_path / "pose.json"]
+    said = refused(capsys, *words)
+    option = re.search(r'--depth-unit "([^"]+)"', said)
+    assert option is not None
+    assert "no seam found" in refused(capsys, *words, "--depth-unit", option[1], code=1)
