@@ -114,7 +114,7 @@ def check_viewpoints(path: str, points: Float[ndarray, "n 3"], viewpoints: Float
     Args:
         points: (n, 3) [m].  viewpoints: (k, 3) [m].  option: whether --viewpoint gave it, rather than the file.
     """
-    if len(viewpoints) == 0:
+    if len(viewpoints) == 0 or _nearest(points) > FARTHEST:  # such a cloud is itself what is wrong: see check_reach
         return
     low, high = points.min(axis=0), points.max(axis=0)
     away = np.linalg.norm(viewpoints - np.clip(viewpoints, low, high), axis=1)
@@ -148,7 +148,7 @@ def check_reach(cloud: PointCloud) -> None:
     """Raises CloudError for a cloud in the robot base that lies where no arm reaches."""
     if not len(cloud):
         return
-    nearest = float(np.sqrt(np.einsum("ij,ij->i", cloud.points, cloud.points).min()))
+    nearest = _nearest(cloud.points)
     if nearest > FARTHEST:
         raise CloudError(
             f"the cloud's nearest point is {nearest:.4g} m from the robot's base (limit {FARTHEST:g} m): nothing an arm reaches;"
@@ -156,3 +156,8 @@ def check_reach(cloud: PointCloud) -> None:
             distance=nearest,
             limit=FARTHEST,
         )
+
+
+def _nearest(points: Float[ndarray, "n 3"]) -> float:
+    """Distance of the nearest point from the base [m]."""
+    return float(np.sqrt(np.einsum("ij,ij->i", points, points).min()))

@@ -83,3 +83,9 @@ def test_a_viewpoint_in_the_file_that_is_elsewhere_is_refused_and_the_option_wor
     with pytest.raises(CloudError, match=r"part.npz: the viewpoint in it, \(0, -450, 420\) m,.*--viewpoint 0 -0.45 0.42$"):
         read_cloud(tmp_path / "part.npz")
     assert len(read_cloud(tmp_path / "part.npz", viewpoint=[0, -0.45, 0.42]).viewpoints) == 1
+
+
+def test_a_cloud_far_away_is_not_blamed_on_its_viewpoint(tmp_path: Path) -> None:
+    np.save(tmp_path / "far.npy", plate() + np.array([12.0, 0, 0]))
+    with pytest.raises(CloudError, match="nothing an arm reaches"):
+        check_plannable(read_cloud(tmp_path / "far.npy", viewpoint=[0, -0.45, 0.42]))

@@ -176,6 +176,15 @@ def test_places_that_differ_by_a_digit_are_one(tmp_path: Path) -> None:
     assert as_mesh(read_mesh_file(tmp_path / "a.obj")).volume == pytest.approx(VOLUME, rel=1e-5)
 
 
+def test_facets_that_are_there_twice_are_left_out_once(tmp_path: Path) -> None:
+    read = read_mesh_file(stl(tmp_path / "a.stl", CORNERS, np.vstack([FACES, FACES[3:6]])))
+    is_the_plate(read)
+    assert read.notes == ()  # the same facet again says nothing new
+    read = read_mesh_file(stl(tmp_path / "a.stl", CORNERS, np.vstack([FACES, FACES[3:6, ::-1]])))
+    is_the_plate(read)
+    assert read.notes == ("a.stl: facets that were there twice: left out once",)
+
+
 def test_a_surface_that_is_open_is_refused_with_the_place_and_filling_it_works(tmp_path: Path) -> None:
     path = stl(tmp_path / "a.stl", CORNERS, FACES[:-1])
     with pytest.raises(SceneError, match=r"is not closed: of its 36 edges 3 have one face only, the first at \(.*fill holes"):

@@ -74,23 +74,37 @@ def read_mesh_file(path: Path) -> MeshFile:
 
 
 def _closed(vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]) -> tuple[Float[ndarray, "w 3"], Shells]:
-    """The surface made of as few changes as close it: none, vertices merged by place, without inner walls, places rounded.
+    """The surface by as few changes as close it: none, vertices merged by place, facets that are there twice left out, walls
+    between bodies left out, places rounded.
 
     Raises:
         Broken: none of them does; the reason is that of the merged surface.
     """
+    merged = _merged(vertices, faces)
     reason = None
-    tolerance = SAME_PLACE * float(np.ptp(vertices, axis=0).max())
-    for change in (lambda: (vertices, faces), lambda: _merged(vertices, faces), lambda: _without_walls(*_merged(vertices, faces)),
-                   lambda: _merged(*_merged(vertices, faces), tolerance)):  # fmt: skip
+    for change, note in (
+        (lambda: (vertices, faces), ""),
+        (lambda: merged, ""),
+        (lambda: _once(*merged), "facets that were there twice: left out once"),
+        (lambda: _without_walls(*merged), ""),
+        (lambda: _merged(*merged, SAME_PLACE * float(np.ptp(vertices, axis=0).max())), ""),
+    ):
         changed, kept = change()
         if len(kept) == 0:
             continue
         try:
-            return changed, outward(changed, kept)
+            shells = outward(changed, kept)
         except Broken as error:
             reason = error if changed is not vertices and reason is None else reason
+            continue
+        return changed, Shells(shells.faces, (note, *shells.notes) if note else shells.notes)
     raise reason or Broken("holds no triangles")
+
+
+def _once(vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "g 3"]]:
+    """With one facet alone on the same three vertices."""
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return vertices, faces[np.sort(first)]
 
 
 def _without_walls(
