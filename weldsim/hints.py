@@ -22,6 +22,7 @@ WIDEST = 0.014  # [m] of the groove that the spacing needed is told for
 NEAREST = 0.1  # [m] before a depth camera: nearer, it sees nothing
 FLATTEST = 0.25  # sine of the angle between sight and surface: flatter, it sees no groove
 STAND_OFF = 0.45  # [m] of the viewpoint that is tried in place of one that cannot be
+AHEAD = 0.8  # cosine to the z axis, along which a camera looks in its own frame, of the way to the middle of its cloud
 FARTHEST = 2.0  # [m] from a camera at the origin to a cloud in its own frame
 
 
@@ -85,8 +86,8 @@ def _of_frame(cloud: PointCloud, config: CellConfig) -> str:
         return ""
     nearest = float(np.sqrt(np.einsum("ij,ij->i", cloud.points, cloud.points).min()))
     plane = _plane(cloud)
-    sight = unit(-plane.middle)
-    if not NEAREST < nearest < FARTHEST or abs(float(sight @ plane.normal)) < FLATTEST:
+    sight = unit(plane.middle)
+    if not NEAREST < nearest < FARTHEST or abs(float(sight[2])) < AHEAD or abs(float(sight @ plane.normal)) < FLATTEST:
         return ""
     if not _finds(replace(cloud, viewpoints=np.zeros((1, 3)), view=None), config):
         return ""

@@ -8,6 +8,7 @@ from weldsim.cloud.visible import Side, sides
 from weldsim.records import PointCloud, Seam, SeamFindings
 
 BELOW = -0.15  # [m] a seam so far below the robot's base lies under the table on which the arm stands
+DOWN = -0.5  # z of the outward normal of a seam that an arm on a table would have to weld overhead
 OPPOSITE = -0.8  # cosine between a seam's outward normals and the way to the frame's origin: seen from there, it is behind
 CAMERA_FRAME = 0.1  # [m] from the origin of the base no camera stands: the cloud is in the camera's own frame
 
@@ -36,7 +37,8 @@ def _worth(findings: SeamFindings) -> float:
 def _places(cloud: PointCloud, seams: tuple[Seam, ...]) -> list[str]:
     """What is odd about where seams lie, for clouds that are in their camera's frame rather than the robot's."""
     notes = []
-    if len(cloud.viewpoints) and float(np.linalg.norm(cloud.viewpoints, axis=1).max()) < CAMERA_FRAME:
+    own_frame = len(cloud.viewpoints) > 0 and float(np.linalg.norm(cloud.viewpoints, axis=1).max()) < CAMERA_FRAME
+    if own_frame:
         notes.append("the camera stood at the origin: the path is in the camera's own frame, not in the robot's base")
     for number, seam in enumerate(seams, 1):
         z = float(np.median(seam.points_B[:, 2]))
@@ -48,6 +50,10 @@ def _places(cloud: PointCloud, seams: tuple[Seam, ...]) -> list[str]:
             notes.append(
                 f"seam {number} faces away from the origin: where the cloud is in its camera's own frame, the torch would come from"
                 " behind the part"
+            )
+        elif not own_frame and float(seam.normals_B[:, 2].mean()) < DOWN:
+            notes.append(
+                f"seam {number} faces down: the torch would come from below; is z up in the cloud, and its viewpoint right?"
             )
     return notes
 

@@ -53,6 +53,7 @@ def test_a_whole_part_is_searched_from_where_it_can_be_seen(thickness: float, kn
     assert np.abs(seam.points_B[:, 1] + 0.45).max() < 0.0005
     assert np.abs(seam.points_B[:, 2]).max() < 0.0005
     assert len(result.findings.region) == len(result.cloud)
+    assert any(note.startswith("seam 1 faces down: the torch would come from below") for note in result.notes) == turned
     assert result.notes[0].endswith("left out" if known else f"of its {'lower' if turned else 'upper'} side, were searched")
 
 

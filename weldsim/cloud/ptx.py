@@ -53,7 +53,7 @@ def _pose(data: bytes, start: int) -> tuple[int, Float[ndarray, "4 4"], int]:
     """How many points a scan has, its matrix (rows from the right), and where its points begin."""
     lines = data[start : start + 4096].split(b"\n")[:10]
     try:
-        rows = [[float(word) for word in line.split()] for line in lines]
+        rows = [[float(word) for word in line.replace(b",", b".").split()] for line in lines]
     except ValueError:
         rows = []
     if [len(row) for row in rows] != [1, 1, *_WIDTHS] or not np.isfinite(np.concatenate(rows)).all():

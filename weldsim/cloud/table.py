@@ -25,12 +25,14 @@ def parse_table(
         text: lines of numbers; blank lines and what follows a # are passed over.
         columns: how many each line must have at least, or which are read, counted from 0.
         rows: read exactly so many lines; None reads all.
-        delimiter: between the numbers; None is white space.
+        delimiter: between the numbers; None is white space, and commas are decimal ones.
     Raises:
         Unreadable: a line that is short or holds something else than numbers, or too few lines.
     """
     if not text.strip():
         raise Unreadable("its header promises points, none follow")
+    if delimiter is None and b"," in text:  # decimal ones: white space parts
+        text = text.replace(b",", b".")
     used = range(columns) if isinstance(columns, int) else columns
     try:
         with warnings.catch_warnings():
@@ -56,8 +58,8 @@ def read_text(data: bytes) -> RawCloud:
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\0" in data[:65_536]:
         raise Unreadable("it is binary, and no PLY, PCD, NPZ or NPY")
-    if b"\r" in data and b"\n" not in data:
-        data = data.replace(b"\r", b"\n")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lines = _head(data)
     table = find_table(lines)
     if table is None:

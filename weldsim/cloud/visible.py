@@ -13,7 +13,7 @@ from numpy import ndarray
 from weldsim.frames import unit
 from weldsim.records import PointCloud
 
-SAMPLE = 20_000  # points that tell whether there are two surfaces
+SAMPLE = 40_000  # points that tell whether there are two surfaces
 WIDTH = 2.0  # of a cell, in spacings of the points
 GAP = 0.003  # [m] without points between two surfaces; sound metal under a groove is thicker
 STEEPEST = 2.5  # rise over run of a wall that is still part of the surface it belongs to

@@ -113,3 +113,15 @@ def test_vertices_of_an_obj_are_a_cloud(tmp_path: Path) -> None:
     lines = [f"v {x} {y} {z} 0.5 0.5 0.5" for x, y, z in POINTS]
     (tmp_path / "a.obj").write_text("\n".join(["# MeshLab", "vn 0 0 1", *lines, "f 1 2 3"]))
     np.testing.assert_allclose(read_cloud(tmp_path / "a.obj").points, POINTS, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["ply", "pcd", "ptx"])
+def test_decimal_commas_in_the_text_of_other_formats(tmp_path: Path, kind: str) -> None:
+    table = "".join(f"{x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in POINTS)
+    heads = {
+        "ply": "ply\nformat ascii 1.0\nelement vertex 150\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+        "pcd": "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 150\nHEIGHT 1\nPOINTS 150\nDATA ascii\n",
+        "ptx": "10\n15\n0 0 0,5\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n",
+    }
+    (tmp_path / "a").write_text(heads[kind] + table.replace(".", ","))
+    np.testing.assert_allclose(read_cloud(tmp_path / "a").points, POINTS, atol=1e-6)
