@@ -46,6 +46,10 @@ COARSENESS = {Finish.MATTE: 1.0, Finish.MILL_SCALE: 1.2, Finish.GROUND: 1.5, Fin
 D415_1280X720 = CameraIntrinsics(width=1280, height=720, fx=925.0, fy=925.0, cx=640.0, cy=360.0)
 """The depth imager's widest mode, nominal (640 x 480 as calibrated is `weldsim.mounts.D415_640X480`)."""
 
+D435_848X480 = CameraIntrinsics(width=848, height=480, fx=424.4, fy=424.4, cx=424.0, cy=240.0)
+"""A D435's common mode; the focal length is that of a D435i whose pixels could be recovered (the single scans of
+thillRobot/seam_detection)."""
+
 _COARSENESS = np.array([COARSENESS[finish] for finish in Finish], np.float32)
 _HOLES_BELOW = ndtri(np.array([DROPOUT[finish] for finish in Finish])).astype(np.float32)  # -inf for no holes
 
@@ -107,10 +111,10 @@ class D415Config:
     """Side of the matcher's support window [px]; decides how far a groove is rounded off. 11 here does what matching with
     windows of 9 does to a V; that of the real camera is not published (its census window is 9)."""
     relief_gain: float = 1.0
-    """Noise grows to (1 + gain) times where disparity varies by `relief_limit` or more inside the window: twice that of
-    the plate inside a 6 mm V in matched rendered pairs."""
+    """Noise grows to (1 + gain) times where the window holds relief of `relief_limit` or more: twice that of the plate inside a
+    6 mm V in matched rendered pairs. Tilt is no relief: on public frames noise is the same on planes of any tilt and distance."""
     relief_limit: Pixel = 0.8
-    """Variation of disparity inside the window at which the growth of noise saturates."""
+    """Relief at which the growth of noise saturates: how far disparity leaves its mean over the window, highest less lowest."""
     pixel_locking: Pixel = 0.01
     """Amplitude A of the pull towards whole disparities, -A sin(2 pi d): at most 0.02 px on tilted planes of public frames."""
     disparity_step: Pixel = 1 / 32
@@ -173,6 +177,14 @@ class D415Config:
         require_within(self, RANGES, "sensor")
 
 
+@dataclass(frozen=True, kw_only=True)
+class D435Config(D415Config):
+    """The parametric D435: the same model and noise, imagers nearer together. Defaults: 848 x 480, factory settings."""
+
+    baseline: Metre = 0.050
+    """Distance between the two imagers (nominal; depth steps of public frames at 640 x 480 give f B = 19255 px mm)."""
+
+
 def _random_field(rng: np.random.Generator, sigma: tuple[float, float], along_rows: tuple[float, float]) -> NoiseField:
     """A field of noise with figures between those limits; blobs in public frames are 1.3 to 1.7 times as long along rows."""
     length = float(rng.uniform(*along_rows))
@@ -209,10 +221,10 @@ def d415(
     true = np.nan_to_num(scale / exact, nan=0.0, posinf=0.0)
     edges = near_edges(true, c.edge_step, 1 + round(c.edge_jitter))
     shown = jitter_edges(still, true, edges, c.edge_jitter)
-    mean, spread = support_average(shown, c.window, c.edge_step)
+    mean, relief = support_average(shown, c.window, c.edge_step)
 
     hidden = hidden_from_right(shown, c.edge_step)
-    noise = _noise(spread, c, still, fresh)
+    noise = _noise(relief, c, still, fresh)
     disparity = mean + (noise if finishes is None else noise * _COARSENESS[finishes])
     rims, between = mixed_rims(fresh, shown, ~hidden, c.edge_step, c.mixed_pixels)
     disparity.reshape(-1)[rims] = between
@@ -237,12 +249,12 @@ def d415(
 
 
 def _noise(
-    spread: Float32[ndarray, "h w"], c: D415Config, still: np.random.Generator, fresh: np.random.Generator
+    relief: Float32[ndarray, "h w"], c: D415Config, still: np.random.Generator, fresh: np.random.Generator
 ) -> Float32[ndarray, "h w"]:
     """Disparity noise [px]: a part that stays and a part that changes, stronger over relief."""
-    field = disparity_noise(c.noise, (spread.shape[0], spread.shape[1]), c.temporal_fraction, still, fresh)
-    relief = np.minimum(spread * np.float32(c.relief_gain / c.relief_limit), np.float32(c.relief_gain))
-    return np.float32(c.noise_gain) * field * (1 + relief)
+    field = disparity_noise(c.noise, (relief.shape[0], relief.shape[1]), c.temporal_fraction, still, fresh)
+    growth = np.minimum(relief * np.float32(c.relief_gain / c.relief_limit), np.float32(c.relief_gain))
+    return np.float32(c.noise_gain) * field * (1 + growth)
 
 
 def view_offset(rng: np.random.Generator, sigma: float) -> float:

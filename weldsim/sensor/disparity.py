@@ -5,7 +5,7 @@ The pieces of the parametric D415 model, each a pure function on arrays. Dispari
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float32, Int
+from jaxtyping import Bool, Float32, Int, UInt8
 from numpy import ndarray
 from numpy.random import Generator
 
@@ -15,26 +15,30 @@ PATCH = 4  # [px] length over which an edge is displaced or dropped as one piece
 def support_average(
     disparity: Float32[ndarray, "h w"], window: int, step: float
 ) -> tuple[Float32[ndarray, "h w"], Float32[ndarray, "h w"]]:
-    """Mean disparity over each pixel's window and its spread there (max - min), both over one surface only [px].
+    """Mean disparity over each pixel's window, over one surface only, and relief there: what the window holds besides a plane.
 
-    Pixels of the window that differ from the middle one by `step` or more belong to another surface and are left out;
-    away from such edges this is a box filter.
+    Pixels of the window that differ from the middle one by `step` or more belong to another surface and are left out; away
+    from such edges the mean is a box filter. Relief is the range (max - min) over the window of the difference between
+    disparity and mean [px]: 0 on any plane, since disparity is linear in the image of a plane, however it is tilted.
     """
     kernel = np.ones((window, window), np.uint8)
     mean = cv2.blur(disparity, (window, window), borderType=cv2.BORDER_REPLICATE)
-    high = cv2.dilate(disparity, kernel, borderType=cv2.BORDER_REPLICATE)
-    spread = high - cv2.erode(disparity, kernel, borderType=cv2.BORDER_REPLICATE)
-    mixed = np.flatnonzero((spread >= step) & (disparity > 0))
+    mixed = np.flatnonzero((_range(disparity, kernel) >= step) & (disparity > 0))
     if mixed.size:
-        flat_mean, flat_spread = mean.reshape(-1), spread.reshape(-1)
-        flat_mean[mixed], flat_spread[mixed] = _average_of_own_surface(disparity, mixed, window, step)
-    return mean, spread
+        mean.reshape(-1)[mixed] = _average_of_own_surface(disparity, mixed, window, step)
+    return mean, _range(np.where(disparity > 0, disparity - mean, np.float32(0)), kernel)
+
+
+def _range(image: Float32[ndarray, "h w"], kernel: UInt8[ndarray, "k k"]) -> Float32[ndarray, "h w"]:
+    """Greatest less least of the image over the kernel around each pixel."""
+    high = cv2.dilate(image, kernel, borderType=cv2.BORDER_REPLICATE)
+    return high - cv2.erode(image, kernel, borderType=cv2.BORDER_REPLICATE)
 
 
 def _average_of_own_surface(
     disparity: Float32[ndarray, "h w"], pixels: Int[ndarray, "n"], window: int, step: float
-) -> tuple[Float32[ndarray, "n"], Float32[ndarray, "n"]]:
-    """Mean and spread over the window of each listed pixel, of the values within `step` of its own."""
+) -> Float32[ndarray, "n"]:
+    """Mean over the window of each listed pixel, of the values within `step` of its own."""
     width = disparity.shape[1]
     before, after = window // 2, window - 1 - window // 2
     padded = cv2.copyMakeBorder(disparity, before, after, before, after, cv2.BORDER_REPLICATE).reshape(-1)
@@ -42,18 +46,14 @@ def _average_of_own_surface(
     corner = pixels // width * stride + pixels % width
     own = disparity.reshape(-1)[pixels]
     total, count = np.zeros_like(own), np.zeros_like(own)
-    low, high = np.zeros_like(own), np.zeros_like(own)
     for row in range(window):
         for column in range(window):
             # Differences from the middle pixel are small numbers, so that float32 sums stay exact to 1e-5 px.
             difference = padded[corner + (row * stride + column)] - own
             same = np.abs(difference) < step
-            difference *= same
-            total += difference
+            total += difference * same
             count += same
-            np.minimum(low, difference, out=low)
-            np.maximum(high, difference, out=high)
-    return own + total / count, high - low
+    return own + total / count
 
 
 def correlated_field(rng: Generator, shape: tuple[int, int], length: float) -> Float32[ndarray, "h w"]:
