@@ -30,11 +30,13 @@ from weldsim.config import CellConfig
 from weldsim.errors import WeldsimError
 from weldsim.frames import Transform
 from weldsim.mounts import D415_640X480
-from weldsim.pipeline import plan, scan
+from weldsim.pipeline import plan
 from weldsim.records import CameraIntrinsics, DepthFrame, PointCloud
 from weldsim.scene.config import FixtureConfig, SceneConfig, ViewConfig
-from weldsim.scene.world import build_world
+from weldsim.scene.world import AWAY, build_world
+from weldsim.sensor.base import View
 from weldsim.sensor.d415 import D435_848X480, FILTERED_NOISE, D415Config, D435Config, d415, unit_intrinsics
+from weldsim.sensor.exact import ExactSensor, twin_scene
 
 SCAN_EYE = np.array([0.0, -0.75, 0.75])  # [m] in B
 TABLE = (-0.058, 0.022, 0.1555)  # height [m] of the scanned table is a x + b y + c
@@ -122,10 +124,12 @@ def plate_view(kind: str, distance: float) -> tuple[ndarray, Transform, CameraIn
         return drilled_depth(D415_640X480, X_BC, THICKNESS), X_BC, D415_640X480
     view = ViewConfig(standoff=distance, tilt=TILT)
     world = build_world(SceneConfig(workpiece="plain_plate", fixture=PLATES[kind], views=(view,)))
-    capture = scan(world, CellConfig(), 0, "exact")[0]
-    if capture.truth is None:
-        raise AssertionError("the twin knows what was in view")
-    return np.asarray(capture.truth.depth), capture.frame.X_BC, capture.frame.intrinsics
+    sensor = ExactSensor(twin_scene(world, world.new_data(AWAY)), D415_640X480, colour=False)  # the arm reaches not every view
+    try:
+        capture = sensor.capture(View(X_BC=world.views[0]))
+    finally:
+        sensor.close()
+    return np.asarray(capture.frame.depth), capture.frame.X_BC, capture.frame.intrinsics
 
 
 def plates(seeds: int, noise: str, filtered: bool) -> Iterator[Bare]:
