@@ -99,9 +99,8 @@ def spectrum(part: Part, seed: int) -> tuple[float, ndarray, ndarray]:
 
 def without_tilt(image: ndarray) -> ndarray:
     """The image less the plane fitted to its pixels; 0 where it has none."""
-    i, j = np.indices(image.shape)
     seen = np.isfinite(image)
-    A = np.stack([np.ones(seen.sum()), i[seen], j[seen]], axis=1)
+    A = np.stack([np.ones(int(seen.sum())), *np.nonzero(seen)], axis=1)
     out = np.zeros(image.shape)
     out[seen] = image[seen] - A @ np.linalg.lstsq(A, image[seen], rcond=None)[0]
     return out
