@@ -80,7 +80,7 @@ def _weights(size: int, length: float) -> _Weights:
     """For `size` pixels whose correlation falls to 1/e at `length`.
 
     Weights of deviation s give a correlation of exp(-r^2 / 4 s^2), so s is half the length. Nodes no farther apart than s
-    make that hold to 1e-4, wherever the pixel lies between them.
+    make that hold to 1e-3, wherever the pixel lies between them; below a length of 2 px they are the pixels, and it holds roughly.
     """
     deviation = length / 2
     step = max(1, int(deviation))

@@ -1,7 +1,8 @@
-"""The parametric D415 reproduces the figures of a simulated stereo pair with window matching.
+"""The parametric D415 reproduces the figures of public depth frames, and for grooves those of a simulated stereo pair.
 
-Exact depth is in closed form (a plane, a groove, a fillet, a step), so that only the model is under test. The targets are
-those of stereo matching on rendered infrared pairs at the same distances; several seeds each.
+Exact depth is in closed form (a plane, a groove, a fillet, a step), so that only the model is under test. Noise and rims are
+held against what was measured on frames of a D415 (demo data of NVlabs/UnseenObjectClustering), grooves and fillets against
+stereo matching on rendered infrared pairs at the same distances; several seeds each.
 """
 
 from dataclasses import replace
@@ -15,7 +16,17 @@ from weldsim.errors import ConfigError, RecordError
 from weldsim.mounts import D415_640X480
 from weldsim.records import CameraIntrinsics
 from weldsim.sensor.base import Finish
-from weldsim.sensor.d415 import COARSENESS, D415_1280X720, DROPOUT, D415Config, d415, unit_intrinsics
+from weldsim.sensor.d415 import (
+    COARSENESS,
+    D415_1280X720,
+    D435_848X480,
+    DROPOUT,
+    D415Config,
+    D435Config,
+    d415,
+    unit_intrinsics,
+)
+from weldsim.sensor.noise import NoiseField, total_sigma
 
 SEEDS = range(4)
 FINE = D415Config(depth_unit=1e-4)  # the model's own figures, not those of the millimetre steps
@@ -29,25 +40,56 @@ def middle(image: ndarray) -> ndarray:
     return image[20:-20, 130:-20]
 
 
-@pytest.mark.parametrize("z", [0.36, 0.42, 0.48, 0.54, 0.60])
-def test_plane_noise_follows_the_makers_law(z: float) -> None:
-    """Standard deviation of depth on a plane: z^2 * 0.08 px / (f B), within 25 %."""
-    exact = profile_depth(D415_640X480, FLAT, z, tilt=0.1)
-    sigma = [np.nanstd(middle(d415(exact, D415_640X480, FINE, seed=[seed]) - exact)) for seed in SEEDS]
-    assert np.mean(sigma) == pytest.approx(z**2 * 0.08 / FB, rel=0.25)
+@pytest.mark.parametrize("z", [0.36, 0.48, 0.60])
+@pytest.mark.parametrize("tilt", [0.1, 0.8])
+def test_plane_noise_is_that_of_public_frames(z: float, tilt: float) -> None:
+    """0.095 px in all, at any distance and tilt: standard deviation of depth on a plane z^2 * 0.095 px / (f B)."""
+    exact = profile_depth(D415_640X480, FLAT, z, tilt=tilt)
+    sigma = [np.nanstd(middle(FB / d415(exact, D415_640X480, FINE, seed=[seed]) - FB / exact)) for seed in SEEDS]
+    assert np.mean(sigma) == pytest.approx(0.095, rel=0.15)
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_noise_is_alike_over_five_pixels(axis: int) -> None:
-    """Correlation falls to 1/e at 4.5 to 6 px along rows and columns."""
-    exact = profile_depth(D415_640X480, FLAT, 0.45)
-    correlation = np.zeros(12)
+def test_noise_is_alike_over_as_many_pixels_as_in_public_frames() -> None:
+    """On parts of 160 x 120 px of a plane, tilt removed: down to 1/e at 11 to 16 px along rows and 8 to 9.5 px along columns."""
+    exact = profile_depth(D415_640X480, FLAT, 0.67, tilt=0.1)
+    correlation = np.zeros((2, 30))
     for seed in SEEDS:
         error = FB / d415(exact, D415_640X480, SMOOTH, seed=[seed]) - FB / exact
-        error = np.moveaxis(middle(error - np.nanmean(error)), axis, 0)
-        correlation += [np.mean(error[: len(error) - lag] * error[lag:]) for lag in range(12)]
-    correlation /= correlation[0]
-    assert 4.5 <= np.interp(-np.exp(-1), -correlation, np.arange(12)) <= 6.0
+        for top, left in ((70, 130), (70, 290), (70, 450), (190, 130), (190, 290), (190, 450), (310, 130), (310, 290)):
+            part = without_tilt(error[top : top + 120, left : left + 160])
+            for axis in (0, 1):
+                lines = np.moveaxis(part, 1 - axis, 0)
+                correlation[axis] += [np.mean(lines[: len(lines) - lag] * lines[lag:]) for lag in range(30)]
+    rows, columns = (np.interp(-np.exp(-1), -each / each[0], np.arange(30)) for each in correlation)
+    assert 11.0 <= rows <= 16.0
+    assert 8.0 <= columns <= 9.5
+
+
+def without_tilt(image: ndarray) -> ndarray:
+    """The image less the plane fitted to it."""
+    rows, columns = np.indices(image.shape)
+    A = np.stack([np.ones(image.size), rows.ravel(), columns.ravel()], axis=1)
+    return (image.ravel() - A @ np.linalg.lstsq(A, image.ravel().astype(float), rcond=None)[0]).reshape(image.shape)
+
+
+def test_the_drivers_filter_takes_fine_noise_away_and_leaves_waves_and_a_large_groove() -> None:
+    exact = profile_depth(D415_640X480, FLAT, 0.45, tilt=0.1)
+    fine = replace(SMOOTH, noise=(NoiseField(sigma=0.1, along_rows=2.0, along_columns=2.0),))
+    left = []
+    for config in (fine, SMOOTH):
+        plain, smooth = (
+            middle(d415(exact, D415_640X480, replace(config, spatial_filter=on), seed=[0]) - exact) for on in (False, True)
+        )
+        left.append(np.nanstd(smooth) / np.nanstd(plain))
+    assert left[0] < 0.6
+    assert 0.8 < left[1] < 0.98
+    groove = profile_depth(D415_640X480, v_groove(0.02, 0.012), 0.40)
+    shown = [
+        np.nanmax(np.nanmean(d415(groove, D415_640X480, replace(SMOOTH, spatial_filter=on), seed=[0])[100:300, 130:], axis=0))
+        - 0.40
+        for on in (False, True)
+    ]
+    assert 0.8 * shown[0] < shown[1] < shown[0]
 
 
 def groove_profile(
@@ -90,7 +132,7 @@ def test_slice_centroids_scatter_as_in_stereo(intrinsics: CameraIntrinsics, z: f
     """Centroid of what lies under the plate, in 2 mm slices along a 6 x 5 mm V, with millimetre steps."""
     exact = profile_depth(intrinsics, v_groove(0.006, 0.005), z)
     centroids = []
-    for seed in SEEDS:
+    for seed in range(12):  # noise is alike over several slices
         depth = d415(exact, intrinsics, D415Config(), seed=[seed])
         points = points_in_part(intrinsics, depth, z)
         near = np.isfinite(depth) & (np.abs(points[..., 0]) < 8e-3)
@@ -169,7 +211,7 @@ def test_part_of_the_noise_changes_between_exposures() -> None:
     exact = profile_depth(D415_640X480, FLAT, 0.45)
     frames = np.array([middle(d415(exact, D415_640X480, SMOOTH, seed=[3], exposure=k)) for k in range(6)])
     total, temporal = np.nanstd(frames - middle(exact)), np.nanmean(np.nanstd(frames, axis=0, ddof=1))
-    assert temporal / total == pytest.approx(0.3, abs=0.05)
+    assert temporal / total == pytest.approx(0.42, abs=0.05)
     still = replace(SMOOTH, temporal_fraction=0.0)
     again = [d415(exact, D415_640X480, still, seed=[3], exposure=k) for k in (0, 1)]
     assert np.array_equal(*again, equal_nan=True)
@@ -182,17 +224,24 @@ def step_scene(step: float, *, near: float = 0.40, column: int = 330) -> ndarray
     return exact
 
 
-def test_a_large_step_leaves_a_shadow_on_its_left_and_nothing_between() -> None:
-    """40 mm: two clean surfaces, the far one blind for as many pixels as the disparities differ."""
+def test_a_large_step_leaves_a_shadow_on_its_left_and_little_between() -> None:
+    """40 mm: two surfaces, the far one blind for 1.1 to 2.3 px more than the disparities differ, and now and then a pixel between
+    them at the rim, which moves from row to row by about half a pixel."""
     exact = step_scene(0.040)
-    depth = d415(exact, D415_640X480, D415Config(), seed=[2])
-    between = (depth > 0.40 + 5e-3) & (depth < 0.44 - 5e-3)
-    assert between.mean() < 1e-5
-    shadow = FB / 0.40 - FB / 0.44
-    blind = np.isnan(depth[:, 330 - 20 : 330]).sum(axis=1)
-    assert abs(np.median(blind) - shadow) <= 2
-    assert np.isfinite(depth[:, 340:]).all()
-    assert np.isfinite(depth[:, 130:300]).all()
+    wider, mixed, moved = [], [], []
+    for seed in SEEDS:
+        depth = d415(exact, D415_640X480, D415Config(), seed=[seed])
+        between = (depth > 0.40 + 4e-3) & (depth < 0.44 - 4e-3)
+        assert not between[:, :325].any()
+        assert not between[:, 335:].any()
+        mixed.append(between.sum(axis=1).mean())
+        wider.append(np.isnan(depth[:, 330 - 25 : 340]).sum(axis=1).mean() - (FB / 0.40 - FB / 0.44))
+        moved.append(np.std(np.diff((depth[:, 300:360] < 0.402).argmax(axis=1))) / np.sqrt(2))
+        assert np.isfinite(depth[:, 340:]).all()
+        assert np.isfinite(depth[:, 130:300]).all()
+    assert 1.1 <= np.mean(wider) <= 2.3
+    assert 0.15 <= np.mean(mixed) <= 0.24
+    assert 0.4 <= np.mean(moved) <= 0.6
 
 
 def test_a_small_step_is_smeared_over_the_window() -> None:
@@ -239,31 +288,50 @@ def test_matte_everywhere_is_the_default() -> None:
 def test_units_differ_within_their_ranges_and_repeat() -> None:
     units = [D415Config.randomised(seed) for seed in range(200)]
     assert units == [D415Config.randomised(seed) for seed in range(200)]
-    for name, low, high in (
-        ("focal_scale", 0.985, 1.015),
-        ("baseline", 0.0547, 0.0553),
-        ("window", 9, 13),
-        ("disparity_sigma", 0.05, 0.10),
-        ("pixel_locking", 0.0, 0.12),
-        ("temporal_fraction", 0.1, 0.7),
+    short, long = ([unit.noise[k] for unit in units] for k in (0, 1))
+    for values, low, high in (
+        ([unit.focal_scale for unit in units], 0.985, 1.015),
+        ([unit.baseline for unit in units], 0.0547, 0.0553),
+        ([unit.window for unit in units], 9, 13),
+        ([field.sigma for field in short], 0.06, 0.10),
+        ([field.along_rows for field in short], 8.0, 16.0),
+        ([field.along_rows / field.along_columns for field in short], 1.3, 1.7),
+        ([field.sigma for field in long], 0.03, 0.10),
+        ([field.along_rows for field in long], 40.0, 150.0),
+        ([field.along_rows / field.along_columns for field in long], 1.3, 1.7),
+        ([unit.pixel_locking for unit in units], 0.0, 0.02),
+        ([unit.temporal_fraction for unit in units], 0.4, 0.75),
+        ([unit.edge_shadow for unit in units], 0.7, 1.9),
+        ([unit.mixed_pixels for unit in units], 0.15, 0.5),
     ):
-        values = np.array([getattr(unit, name) for unit in units])
-        assert low <= values.min() < values.max() <= high
-        assert values.max() - values.min() > 0.9 * (high - low)
+        assert low <= min(values) < max(values) <= high
+        assert max(values) - min(values) > 0.9 * (high - low)
+    assert 0.4 < np.mean([unit.spatial_filter for unit in units]) < 0.6
     base = D415Config(offset_sigma=2e-3, depth_unit=1e-4)
     assert {(u.offset_sigma, u.depth_unit) for u in (D415Config.randomised(seed, base) for seed in range(5))} == {(2e-3, 1e-4)}
 
 
+def test_a_d435_is_the_same_model_with_its_imagers_nearer_together() -> None:
+    plain = D435Config()
+    assert plain == D435Config(**vars(replace(D415Config(), baseline=0.050)))
+    unit = D435Config.randomised(1)
+    assert isinstance(unit, D435Config)
+    assert unit.baseline == pytest.approx(0.050, abs=0.3e-3)
+    exact = profile_depth(D435_848X480, FLAT, 0.6, tilt=0.1)
+    error = middle(d415(exact, D435_848X480, replace(plain, depth_unit=0.0), seed=[0]) - exact)
+    assert np.nanstd(error) == pytest.approx(0.6**2 * 0.095 / (424.4 * 0.050), rel=0.15)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_any_unit_sees_planes_where_they_are(seed: int) -> None:
-    """Focal length and baseline belong to the unit and it knows them: no scale error, and the noise law is its own."""
-    unit = D415Config.randomised(seed, SMOOTH)
+    """Focal length and baseline belong to the unit and it knows them: no scale error, and the noise is its own."""
+    unit = replace(D415Config.randomised(seed, SMOOTH), spatial_filter=False)
     intrinsics = unit_intrinsics(D415_640X480, unit)
     exact = profile_depth(intrinsics, FLAT, 0.45, tilt=0.1)
     error = middle(d415(exact, intrinsics, unit, seed=[seed]) - exact)
     assert abs(np.nanmean(error)) < 0.2e-3
-    law = 0.45**2 * np.hypot(unit.disparity_sigma, unit.pixel_locking / np.sqrt(2)) / (intrinsics.fx * unit.baseline)
-    assert np.nanstd(error) == pytest.approx(law, rel=0.2)
+    law = 0.45**2 * total_sigma(unit.noise) / (intrinsics.fx * unit.baseline)
+    assert np.nanstd(error) == pytest.approx(law, rel=0.25)
 
 
 def test_an_empty_view_gives_an_empty_image() -> None:
@@ -273,7 +341,15 @@ def test_an_empty_view_gives_an_empty_image() -> None:
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("baseline", 0.0), ("window", -1), ("window", 10), ("disparity_sigma", -0.1), ("temporal_fraction", 1.5)],
+    [
+        ("baseline", 0.0),
+        ("window", -1),
+        ("window", 10),
+        ("noise_gain", -0.1),
+        ("edge_shadow", -1.0),
+        ("mixed_pixels", 1.5),
+        ("temporal_fraction", 1.5),
+    ],
 )
 def test_impossible_figures_are_refused(key: str, value: float) -> None:
     with pytest.raises(ConfigError, match=key):

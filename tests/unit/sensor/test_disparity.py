@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from weldsim.sensor.disparity import correlated_field, hidden_from_right, jitter_edges, near_edges, support_average
+from weldsim.sensor.disparity import (
+    correlated_field,
+    hidden_from_right,
+    jitter_edges,
+    left_of,
+    mixed_rims,
+    near_edges,
+    support_average,
+)
 
 
 def blocks(seed: int, shape: tuple[int, int] = (24, 31)) -> ndarray:
@@ -21,21 +29,35 @@ def blocks(seed: int, shape: tuple[int, int] = (24, 31)) -> ndarray:
 @pytest.mark.parametrize("window", [3, 5, 11])
 def test_support_average_is_the_mean_of_its_own_surface(seed: int, window: int) -> None:
     image, step, half = blocks(seed), 4.0, window // 2
-    mean, spread = support_average(image, window, step)
+    mean, relief = support_average(image, window, step)
     padded = np.pad(image, half, mode="edge")
+    left = np.pad(np.where(image > 0, image - mean, 0.0), half, mode="edge")
     for r, c in np.argwhere(image > 0):
         around = padded[r : r + window, c : c + window].astype(float)
         own = around[np.abs(around - image[r, c]) < step]
         assert mean[r, c] == pytest.approx(own.mean(), abs=1e-4)
-        assert spread[r, c] == pytest.approx(np.ptp(own), abs=1e-4)
+        assert relief[r, c] == pytest.approx(np.ptp(left[r : r + window, c : c + window]), abs=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_constant_surface_is_not_changed(seed: int) -> None:
     image = np.where(blocks(seed) > 60, 72.0, 0.0).astype(np.float32)
-    mean, spread = support_average(image, 11, 4.0)
+    mean, relief = support_average(image, 11, 4.0)
     assert mean[image > 0] == pytest.approx(72.0, abs=1e-5)
-    assert spread[image > 0] == pytest.approx(0.0, abs=1e-5)
+    assert relief == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(("down", "along"), [(0.0, 0.0), (0.08, 0.0), (-0.05, 0.2)])
+def test_a_plane_has_no_relief_however_it_is_tilted_and_a_ridge_has(down: float, along: float) -> None:
+    rows, columns = np.indices((60, 80))
+    plane = (60 + down * rows + along * columns).astype(np.float32)
+    mean, relief = support_average(plane, 11, 4.0)
+    assert np.abs(mean - plane)[6:-6, 6:-6].max() < 1e-4
+    assert relief[11:-11, 11:-11].max() < 1e-4
+    ridge = plane + np.maximum(1 - np.abs(columns - 40) / 5, 0).astype(np.float32)
+    relief = support_average(ridge, 11, 4.0)[1]
+    assert 0.6 < relief[30, 40] < 1.1
+    assert relief[30, 11:20].max() < 1e-4
 
 
 @pytest.mark.parametrize("length", [2.0, 5.3, 12.0])
@@ -79,3 +101,39 @@ def test_edges_move_by_about_what_is_asked_and_surfaces_stay() -> None:
     assert abs(where.mean()) < 0.3
     assert 0.4 < where.std() < 1.6
     assert near_edges(image, 25.0, 3).size == 0
+
+
+def test_shadows_are_widened_to_their_left_alone_and_by_what_is_asked() -> None:
+    hidden = np.zeros((400, 60), bool)
+    hidden[:, 30:40] = True
+    hidden[:, :5] = True  # a run at the border has nothing to its left
+    found = np.zeros_like(hidden)
+    found.reshape(-1)[left_of(np.random.default_rng(0), hidden, 1.3)] = True
+    assert set(np.flatnonzero(found.any(axis=0))) <= {27, 28, 29}
+    assert found[:, 29].mean() > found[:, 28].mean() > found[:, 27].mean()
+    assert found.sum(axis=1).mean() == pytest.approx(1.3, abs=0.15)
+    close = np.zeros((8, 20), bool)
+    close[:, 1] = True
+    rows, columns = np.divmod(left_of(np.random.default_rng(0), close, 5.0), 20)
+    assert set(columns) == {0}  # not round to the row above
+    assert set(rows) == set(range(8))
+    assert left_of(np.random.default_rng(0), np.zeros((8, 20), bool), 1.3).size == 0
+
+
+def test_rims_show_now_and_then_what_lies_between_two_surfaces() -> None:
+    image = np.full((600, 80), 70.0, np.float32)
+    image[:, 30:50] = 90.0
+    image[:, 60:] = 0.0  # beside nothing there is nothing to mix
+    seen = np.ones(image.shape, bool)
+    seen[300:, 49] = False
+    pixels, between = mixed_rims(np.random.default_rng(0), image, seen, 4.0, 0.2)
+    columns = pixels % 80
+    assert set(columns) == {30, 49}  # on the nearer side
+    assert (columns == 30).mean() == pytest.approx(2 / 3, abs=0.1)
+    assert len(pixels) / 900 == pytest.approx(0.2, abs=0.05)
+    assert between.min() > 70.0
+    assert between.max() < 90.0
+    assert between.mean() == pytest.approx(80.0, abs=2.0)
+    turned, _ = mixed_rims(np.random.default_rng(0), np.ascontiguousarray(image.T), np.ascontiguousarray(seen.T), 4.0, 0.2)
+    assert set(turned // 600) == {30, 49}
+    assert mixed_rims(np.random.default_rng(0), image, seen, 25.0, 1.0)[0].size == 0
