@@ -23,7 +23,7 @@ from weldsim.scan.config import ScanConfig
 from weldsim.scene.miscalibration import TwinConfig
 from weldsim.schema import describe, structure, to_json
 from weldsim.seam.config import SeamConfig
-from weldsim.sensor.d415 import D415Config
+from weldsim.sensor.d415 import D415Config, D435Config
 from weldsim.sensor.kinect import KinectConfig
 from weldsim.sensor.stereo_config import D415StereoConfig
 
@@ -54,6 +54,9 @@ class CellConfig:
 
     sensor: D415Config = field(default_factory=D415Config)
     """How the simulated D415 sees."""
+
+    d435: D435Config = field(default_factory=D435Config)
+    """How a simulated D435 in its place sees (sensor d435)."""
 
     stereo: D415StereoConfig = field(default_factory=D415StereoConfig)
     """How the reference D415 sees (sensor d415-stereo)."""

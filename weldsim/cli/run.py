@@ -31,7 +31,7 @@ class Run(ConfigOptions):
     """Of the camera's noise."""
 
     sensor: SensorName = "d415"
-    """What looks: the model of a D415, rendered and matched infrared images, the Kinect v2 above, or exact depth."""
+    """What looks: the model of a D415 or D435, rendered and matched infrared images, the Kinect v2 above, or exact depth."""
 
     method: Method | None = None
     """Seam finder: ours (the default) or the published one."""

@@ -24,7 +24,7 @@ class Scan(ConfigOptions):
     """Of the camera's noise."""
 
     sensor: SensorName = "d415"
-    """What looks: the model of a D415, rendered and matched infrared images, the Kinect v2 above, or exact depth."""
+    """What looks: the model of a D415 or D435, rendered and matched infrared images, the Kinect v2 above, or exact depth."""
 
     out: Path | None = None
     """Where to write the cloud of all views: PLY, NPZ, XYZ or TXT."""

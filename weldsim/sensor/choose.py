@@ -6,7 +6,7 @@ from weldsim.frames import Transform
 from weldsim.mounts import KINECT_V2, X_WC_KINECT
 from weldsim.records import CameraIntrinsics
 from weldsim.sensor.base import DepthSensor
-from weldsim.sensor.d415 import D415Config, unit_intrinsics
+from weldsim.sensor.d415 import D435_848X480, D415Config, D435Config, unit_intrinsics
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from weldsim.sensor.exact import TwinScene
     from weldsim.sensor.kinect import KinectConfig
 
-SensorName = Literal["d415", "d415-stereo", "kinect", "exact"]
+SensorName = Literal["d415", "d435", "d415-stereo", "kinect", "exact"]
 EXACT_STEP = 1e-4  # [m] of depth that has no step of its own, in a PNG
 
 
@@ -27,6 +27,8 @@ class SensorTables(Protocol):
 
     @property
     def sensor(self) -> D415Config: ...
+    @property
+    def d435(self) -> D435Config: ...
     @property
     def stereo(self) -> "D415StereoConfig": ...
     @property
@@ -39,7 +41,7 @@ def make_sensor(
     """The camera called `name`, looking at `scene`; close it after use.
 
     Args:
-        intrinsics: nominal ones of the wrist camera; the Kinect has its own.
+        intrinsics: nominal ones of the wrist camera; a D435 in its place and the Kinect have their own.
         tables: settings of all of them.  seed: of the unit and its noise.
     Raises:
         SensorError: nothing draws here.
@@ -58,12 +60,18 @@ def make_sensor(
 
     if name == "exact":
         return ExactSensor(scene, intrinsics)
-    return D415Fast(ExactSensor(scene, unit_intrinsics(intrinsics, tables.sensor)), tables.sensor, seed=seed)
+    config, nominal = (tables.d435, D435_848X480) if name == "d435" else (tables.sensor, intrinsics)
+    return D415Fast(ExactSensor(scene, unit_intrinsics(nominal, config)), config, seed=seed)
 
 
 def depth_step(name: SensorName, tables: SensorTables) -> float:
     """The step [m] in which that camera's depth is stored, EXACT_STEP where it has none of its own."""
-    units = {"d415": tables.sensor.depth_unit, "d415-stereo": tables.stereo.depth_unit, "kinect": tables.kinect.depth_unit}
+    units = {
+        "d415": tables.sensor.depth_unit,
+        "d435": tables.d435.depth_unit,
+        "d415-stereo": tables.stereo.depth_unit,
+        "kinect": tables.kinect.depth_unit,
+    }
     return units.get(name, 0.0) or EXACT_STEP
 
 

@@ -13,6 +13,7 @@ which.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float32, UInt8
@@ -98,6 +99,8 @@ thillRobot/seam_detection): what is left after the filter, so `spatial_filter` s
 class D415Config:
     """The parametric D415. Defaults: 640 x 480, factory settings. What surfaces look like is the scene's to say."""
 
+    model: ClassVar[str] = "d415"
+
     focal_scale: float = 1.0
     """Focal length of this unit over that of the nominal intrinsics; the camera knows and reports its own."""
     baseline: Metre = 0.055
@@ -173,13 +176,15 @@ class D415Config:
 
     def __post_init__(self) -> None:
         if self.window % 2 == 0:  # it would shift the image by half a pixel
-            raise ConfigError(f"sensor.window: {self.window} must be odd", key="window", value=self.window)
-        require_within(self, RANGES, "sensor")
+            raise ConfigError(f"window: {self.window} must be odd", key="window", value=self.window)
+        require_within(self, RANGES, "sensor" if self.model == "d415" else self.model)
 
 
 @dataclass(frozen=True, kw_only=True)
 class D435Config(D415Config):
     """The parametric D435: the same model and noise, imagers nearer together. Defaults: 848 x 480, factory settings."""
+
+    model: ClassVar[str] = "d435"
 
     baseline: Metre = 0.050
     """Distance between the two imagers (nominal; depth steps of public frames at 640 x 480 give f B = 19255 px mm)."""

@@ -1,4 +1,4 @@
-"""A simulated D415: the parametric model wrapped around an exact camera."""
+"""A simulated D415 or D435: the parametric model wrapped around an exact camera."""
 
 from typing import final
 
@@ -49,7 +49,7 @@ class D415Fast(DepthSensor):
             X_BC=view.X_BC,
             colour=inner.frame.colour,
             t=view.t,
-            source=f"d415 model on {inner.frame.source}",
+            source=f"{self._config.model} model on {inner.frame.source}",
         )
         return Capture(frame=frame, truth=inner.truth)
 

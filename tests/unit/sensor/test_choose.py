@@ -6,13 +6,14 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from weldsim.config import CellConfig
+from weldsim.config import CellConfig, load_config
 from weldsim.mounts import KINECT_V2
 from weldsim.pipeline import scan
 from weldsim.scene.config import MaterialConfig, SceneConfig
 from weldsim.scene.world import World, build_world
 from weldsim.sensor.base import Capture, Finish, Label
 from weldsim.sensor.choose import EXACT_STEP, SensorName, depth_step, posture, stations
+from weldsim.sensor.d415 import D435_848X480
 
 NAMES = get_args(SensorName)
 
@@ -32,6 +33,7 @@ def test_every_camera_sees_the_part_and_its_groove(captures: dict[str, Capture],
     frame, truth = captures[name].frame, captures[name].truth
     assert truth is not None
     assert (frame.intrinsics is KINECT_V2) == (name == "kinect")
+    assert (frame.intrinsics == D435_848X480) == (name == "d435")
     workpiece = np.isin(truth.labels, (Label.PART, Label.GROOVE))
     assert workpiece.sum() > 3000
     assert np.isfinite(frame.depth[workpiece]).mean() > 0.85  # beside the clamps there are shadows
@@ -76,3 +78,13 @@ def test_a_unit_has_its_own_focal_length(world: World) -> None:
     config = replace(CellConfig(), sensor=replace(CellConfig().sensor, focal_scale=1.01))
     frame = scan(world, config)[0].frame
     assert frame.intrinsics.fx == pytest.approx(1.01 * world.intrinsics.fx)
+
+
+def test_a_d435_follows_its_own_table(world: World, captures: dict[str, Capture]) -> None:
+    assert "d435" in captures["d435"].frame.source
+    config = load_config(None, ["d435.focal_scale=1.01", "sensor.window=9"])
+    assert config.d435.baseline == 0.050
+    seen = scan(world, config, 0, "d435")[0].frame
+    assert seen.intrinsics.fx == pytest.approx(1.01 * 424.4)
+    plain = scan(world, load_config(None, ["sensor.noise_gain=3"]), 0, "d435")[0].frame
+    assert np.array_equal(plain.depth, captures["d435"].frame.depth, equal_nan=True)
