@@ -137,3 +137,49 @@ def test_fault_drills_judge_by_the_controllers_own_record() -> None:
         (judged(1.1, disconnect=9.0), "disconnect took"),
     ):
         assert any(said in line for line in row["wrong"]), (said, row["wrong"])
+
+
+def test_bare_surfaces_are_as_they_are_called():
+    """A table cropped like the public scans, and a plate with round holes down to the table."""
+    module = script("24_bare_surfaces")
+    found = list(module.tables(1, "measured", False))
+    assert [bare.surface.split()[-1] for bare in found] == ["true", "wrong", "none"]
+    assert [len(bare.cloud.viewpoints) for bare in found] == [1, 1, 0]
+    points = np.asarray(found[0].cloud.points)
+    assert 30_000 < len(points) < 45_000  # the scans have 40,000
+    a, b, c = module.TABLE
+    off = points[:, 2] - points[:, :2] @ (a, b) - c
+    assert 1e-3 < off.std() < 6e-3
+
+    camera = module.D415_640X480
+    X_BC = module.looking(np.array([0.0, -0.45, 0.4 + module.THICKNESS]), np.pi / 2)
+    depth = module.drilled_depth(camera, X_BC, module.THICKNESS).astype(float)
+    height = (camera.rays() * depth[..., None]) @ X_BC.R.T + X_BC.p
+    open_share = np.pi * module.HOLE_RADIUS**2 / module.HOLE_PITCH**2
+    assert np.mean(height[..., 2] < module.THICKNESS - 1e-6) == pytest.approx(open_share, abs=0.01)
+    assert height[..., 2].min() == pytest.approx(0.0, abs=1e-6)
+    axis = height[..., :2] - module.HOLE_PITCH * np.rint(height[..., :2] / module.HOLE_PITCH)
+    inside = (height[..., 2] < module.THICKNESS - 1e-6) & (height[..., 2] > 1e-6)
+    assert np.linalg.norm(axis[inside], axis=1) == pytest.approx(module.HOLE_RADIUS, abs=1e-6)
+
+
+@pytest.mark.parametrize(("wavelength", "band"), [(7.0, 1), (35.0, 3), (75.0, 4)])
+def test_a_wave_is_counted_in_its_band(wavelength, band):
+    module = script("25_noise_spectrum")
+    x = np.arange(400) * module.GRID * 1e3
+    image = 2e-3 * np.sin(2 * np.pi * x / wavelength)[:, None] * np.ones(400)
+    found = module.bands(image)
+    assert found[band] == pytest.approx(2e-3 / np.sqrt(2), rel=0.1)
+    assert np.delete(found, band).max() < 0.3 * found[band]
+    assert np.abs(module.without_tilt(0.3 * image + 0.01 * x[:, None] - 0.02 * x)).max() < 2e-3
+
+
+def test_the_twins_roughness_of_a_flat_part_is_that_of_public_frames():
+    """A D415 at 0.67 m: rms in each band from 20 to 400 mm within a factor of 1.8, none of it where the frames have none."""
+    module = script("25_noise_spectrum")
+    part = module.PARTS[0]
+    sigma, twin, _ = module.spectrum(part, 0)
+    assert sigma == pytest.approx(part.sigma, rel=0.15)
+    ratio = 1e3 * twin / part.real
+    assert ((ratio[3:] > 1 / 1.8) & (ratio[3:] < 1.8)).all()
+    assert (ratio[:3] < 1.0).all()
