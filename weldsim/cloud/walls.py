@@ -14,6 +14,7 @@ from weldsim.records import CameraIntrinsics, PointCloud
 
 REACH = 0.008  # [m] surfaces further apart along the line of sight are different ones
 SIGMAS = 2.0  # a mean disagreement beyond so many standard deviations of a single point is no noise
+WAVES = 3.0  # nor is one beyond so many of what squares of the same two views disagree by: noise is alike over several squares
 LEAST = 5e-4  # [m] disagreements smaller than this are left alone
 BETTER = 1.15  # times as well seen, to be preferred
 STEP = 0.01  # share of the depth that differs between neighbouring pixels at an edge
@@ -37,8 +38,8 @@ def double_walls(clouds: Sequence[PointCloud]) -> list[Bool[ndarray, "_"]]:
     """For each cloud, which of its points are a worse-seen copy of a surface that another view shows elsewhere.
 
     Compared by squares of the depth image: each square's points are looked up in the other view's image. Where the mean
-    distance between the two surfaces is beyond noise, the view that sees the surface better (nearer, less obliquely) is
-    right and the square is marked in the other. Where they agree, both stay.
+    distance between the two surfaces is beyond noise, and beyond what these two views disagree by everywhere, the view that
+    sees the surface better (nearer, less obliquely) is right and the square is marked in the other. Where they agree, both stay.
 
     Args:
         clouds: organised views in B, lined up.
@@ -118,7 +119,8 @@ def _worse(image: _Image, other: _Image) -> Bool[ndarray, "bh bw"]:
         image.noise * image.blocks.centre[..., 2].ravel() ** 2, other.noise * np.median(depth[close]) ** 2 if close.any() else 0
     )
     enough = count >= 0.5 * (SIDE / STRIDE) ** 2
-    return (enough & (np.abs(mean) > np.maximum(SIGMAS * sigma, LEAST))).reshape(h, w)
+    waves = 1.4826 * float(np.median(np.abs(mean[enough] - np.median(mean[enough])))) if enough.any() else 0.0
+    return (enough & (np.abs(mean) > np.maximum(SIGMAS * sigma, max(WAVES * waves, LEAST)))).reshape(h, w)
 
 
 def _by_point(mask: Bool[ndarray, "bh bw"], cloud: PointCloud) -> Bool[ndarray, "n"]:
