@@ -18,6 +18,8 @@ from weldsim.curves import arc_length, interpolate, project, tangents
 from weldsim.frames import Transform, matrix_from_rotation_vector, unit
 from weldsim.mounts import D415_640X480
 from weldsim.records import CameraIntrinsics, KnownSeam, PointCloud
+from weldsim.sensor.d415 import D415_NOISE
+from weldsim.sensor.noise import disparity_noise
 
 Curve = Literal["straight", "arc", "s"]
 Noise = Literal["none", "iid", "d415"]
@@ -29,7 +31,6 @@ ARC_RADIUS = 0.30  # [m] of the 'arc' seam in the plate
 S_AMPLITUDE = 0.015  # [m] of the 's' seam, one period over the plate
 BASELINE = 0.055  # [m] D415
 SUPPORT, SUPPORT_LIMIT = 11, 3.0  # [px] matching window, and the disparity step it does not average across
-NOISE_PX, NOISE_CORRELATION = 0.075, 5.3  # [px] disparity noise and its 1/e correlation length
 EDGE_STEP = 4.0  # [px] disparity step at which pixels are lost
 
 
@@ -139,8 +140,8 @@ def two_grooves(seed: int = 0) -> PointCloud:
 
 
 def d415_depth(z: Float[ndarray, "h w"], fx: float, rng: np.random.Generator) -> Float[ndarray, "h w"]:
-    """Depth [m] as an active-stereo camera would report it: averaged over the support window, correlated noise that
-    doubles where disparity varies within the window, 1/32 px and 1 mm steps, NaN at depth steps."""
+    """Depth [m] as an active-stereo camera would report it: averaged over the support window, the noise of a measured D415 that
+    doubles over relief within the window, 1/32 px and 1 mm steps, NaN at depth steps."""
     valid = np.isfinite(z)
     d = np.where(valid, fx * BASELINE / np.where(valid, z, 1.0), 0.0)
     window = np.ones((SUPPORT, SUPPORT), np.uint8)
@@ -152,10 +153,10 @@ def d415_depth(z: Float[ndarray, "h w"], fx: float, rng: np.random.Generator) ->
     mean = cv2.boxFilter(d, -1, (SUPPORT, SUPPORT), normalize=False, borderType=cv2.BORDER_CONSTANT) / np.maximum(count, 1)
     rows, cols = np.nonzero(valid & ((high - d > SUPPORT_LIMIT) | (d - low > SUPPORT_LIMIT)))
     mean[rows, cols] = _limited_mean(d, valid, rows, cols)
-    taps = cv2.getGaussianKernel(31, NOISE_CORRELATION / 2)
-    white = rng.standard_normal((z.shape[0] + 30, z.shape[1] + 30))
-    field = cv2.sepFilter2D(white, -1, taps, taps)[15:-15, 15:-15] / float((taps**2).sum())
-    d = mean + NOISE_PX * field * (1 + np.clip((high - low) / 0.8, 0, 1))
+    left = np.where(valid, d - mean, 0.0)
+    relief = cv2.dilate(left, window) - cv2.erode(left, window)
+    field = disparity_noise(D415_NOISE, (z.shape[0], z.shape[1]), 0.0, rng, rng)
+    d = mean + field * (1 + np.clip(relief / 0.8, 0, 1))
     d = np.round(d * 32) / 32
     out = np.round(fx * BASELINE / np.maximum(d, 1e-3) * 1e3) / 1e3
     out[~valid | (step >= EDGE_STEP)] = np.nan
