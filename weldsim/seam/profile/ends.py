@@ -77,7 +77,8 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     if not sides:
         return None
     if len(sides) == 1:
-        return _one_edge(across[sides[0]], edge[sides[0]]) if goes_on[~sides[0]].mean() > 0.7 else None
+        other = goes_on[~sides[0]]
+        return _one_edge(across[sides[0]], edge[sides[0]]) if len(other) and other.mean() > 0.7 else None
     slope, level = _median_line(across, edge)
     off = np.abs(edge - level - slope * across)
     keep = off <= max(2.5 * float(np.median(off)), 0.0015)
