@@ -72,7 +72,9 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     if not ends:
         return None
     across, edge = np.array(ends).T
-    goes_on = (here + way * 0.044 - edge) * way < CELL
+    # Nothing is known beyond the rail's own end.
+    limit = min(here + 0.044, (len(fit.rail) - 1) * fit.rail.step) if way > 0 else max(here - 0.044, 0.0)
+    goes_on = (limit - edge) * way < 1.5 * CELL
     sides = [side for side in (across > 0, across < 0) if side.sum() >= 3 and goes_on[side].mean() <= 0.3]
     if not sides:
         return None
