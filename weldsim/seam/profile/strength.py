@@ -15,7 +15,7 @@ from numpy import ndarray
 from weldsim.seam.profile.smooth import ORDER, end_stiffness
 
 STRENGTHS = 10.0 ** np.arange(-2.0, 10.1, 0.5)  # [stations^6] from hardly any to a parabola
-USUAL = (7.0, 1.5)  # log10 of the strength before anything is seen, and its deviation: seams are straight or bend over 0.1 m and
+USUAL = (6.0, 3.0)  # log10 of the strength before anything is seen, and its deviation: seams are straight or bend over 0.1 m and
 # more, and under the noise of a depth camera their third differences are those of strengths of 10^6 to 10^9
 WHITE = 0.1  # of the noise's variance is taken as independent: a Gaussian correlation alone would be too smooth to be true
 FEWEST_BLOCKS = 7  # tell nothing of a strength
