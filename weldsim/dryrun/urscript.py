@@ -1,7 +1,8 @@
 """The motions of a URScript program in their order: it is run with functions that write down what they are asked for.
 
-Functions, variables, loops and poses that are computed are the program's own affair; one whose motions depend on an input, a
-register or a thread cannot be told beforehand and is refused where it begins to.
+Functions, variables, loops and poses that are computed are the program's own affair. What a robot would be asked for is
+unknown: waits, choices and threads that depend on it and move nothing are passed over and told; a program whose motions depend on
+it cannot be told beforehand and is refused where they begin to.
 """
 
 import sys
@@ -14,16 +15,20 @@ from numpy import ndarray
 
 from weldsim.dryrun.program import Command, Motion, Program
 from weldsim.dryrun.robot_state import RobotState
-from weldsim.dryrun.script_names import ASKING, MOVING, OUTPUTS, RESTING, SILENT
+from weldsim.dryrun.script_names import ASKING, MOVES, MOVING, OUTPUTS, RESTING, SILENT
+from weldsim.dryrun.script_notes import ScriptNotes
+from weldsim.dryrun.unknown import UNKNOWN_OPERATIONS, Unknown, UntoldError, decided, spreading, unknown_among
 from weldsim.errors import InputError
 from weldsim.frames import Transform
 from weldsim.mounts import X_FT
 from weldsim.urscript.check import is_pose, six
 from weldsim.urscript.compiler import FILE, Compiled, compile_program
+from weldsim.urscript.effects import Effects
 from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.geometry import PoseFunctions
 from weldsim.urscript.numbers import NumberFunctions
-from weldsim.urscript.values import OPERATIONS, number
+from weldsim.urscript.strings import StringFunctions
+from weldsim.urscript.values import number
 
 TURNS = 10_000  # of all loops together; more is a program that does not end
 LOOKED_AFTER, REPEATS, LONGEST_ROUND = 1000, 4, 500  # turns; rounds that must be alike, and motions of one at most
@@ -44,7 +49,8 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
     """
     recorder = _Recorder(X_FT, q_start)
     try:
-        recorder.run(compile_program(text.replace("\r\n", "\n").replace("\r", "\n"), recorder.builtins()))
+        program = compile_program(text.replace("\r\n", "\n").replace("\r", "\n"), recorder.builtins(), moving=MOVES)
+        recorder.run(program)
     except ScriptError as error:
         where = f"line {error.line}: " if error.line else ""
         raise InputError(f"{source}: {where}{error.reason}", path=source, line=error.line) from None
@@ -61,7 +67,7 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
         motions=tuple(recorder.motions),
         X_FT=recorder.state.mount,
         pauses=recorder.pauses,
-        notes=tuple(recorder.notes),
+        notes=recorder.notes.sentences(),
     )
 
 
@@ -69,40 +75,29 @@ class _HaltError(Exception):
     """The program said halt."""
 
 
-class _Unknown:
-    """What a function would say that asks a robot: nothing can be decided by it."""
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def _refuse(self, *_: object) -> Any:
-        raise ScriptError(f"{self._name}: what follows depends on its answer and cannot be told beforehand")
-
-    __bool__ = __eq__ = __ne__ = __lt__ = __gt__ = __le__ = __ge__ = _refuse
-
-
 class _Recorder:
     """A program's functions. Attributes: motions, what they wrote down; state, of the robot by then; pauses [s]; notes;
     halted, whether it said so; shown, the last popup."""
 
     def __init__(self, fixed: Transform | None, q_start: Float[ndarray, "6"] | None) -> None:
-        self.fixed, self.state = fixed, RobotState(fixed or X_FT, q_start)
+        self.fixed, self.state = fixed, RobotState(X_FT if fixed is None else fixed, q_start)
         self.halted, self.shown = False, ""
         self.motions: list[Motion] = []
-        self.notes: list[str] = []
+        self.notes = ScriptNotes()
         self.pauses = 0.0
         self.lines: tuple[int, ...] = ()
-        self.turns, self.on, self.said = 0, set(), set()
+        self.turns, self.on, self.tcp_set = 0, set(), False
+        self.changing: dict[str, str] = {}  # {variable: the thread that changes it}
+        self.names: dict[str, Any] = {}
+        self.effects: Effects | None = None
 
     def run(self, compiled: Compiled) -> None:
         """The whole program, once. Raises ScriptError with the line."""
-        self.lines = compiled.lines
-        names: dict[str, Any] = {f"b_{name}": function for name, function in self.builtins().items()} | OPERATIONS
-        refuse = {"_run": "run", "_kill": "kill", "_join": "join"}
-        names |= {key: _refusing(f"{word}: what threads do cannot be told beforehand") for key, word in refuse.items()}
+        self.lines, self.effects = compiled.lines, compiled.effects
+        self.names = names = {f"b_{name}": function for name, function in self.builtins().items()} | dict(UNKNOWN_OPERATIONS)
+        names |= {"_run": self._run, "_kill": lambda handle: None, "_join": lambda handle: iter(())}
         names |= {"_halt": self._halt, "_spin": self._spin, "_enter": lambda: None, "_leave": lambda: None}
+        names |= {"_pass_over": self._pass_over, "_of_thread": self._of_thread}
         try:
             exec(compiled.code, names)  # built from the syntax tree alone, see the compiler
             for _ in names["main"]():
@@ -116,9 +111,9 @@ class _Recorder:
 
     def builtins(self) -> dict[str, Callable]:
         """{name: function} of all that a program can call."""
-        groups = (PoseFunctions(), NumberFunctions(), self.state)
+        groups = (PoseFunctions(), NumberFunctions(), StringFunctions(), self.state)
         out: dict[str, Callable] = {
-            name: getattr(group, name)
+            name: spreading(getattr(group, name))
             for group in groups
             for name in dir(group)
             if not name.startswith("_") and callable(getattr(group, name))
@@ -128,8 +123,8 @@ class _Recorder:
         out |= {name: _refusing(f"{name}: its motion is not checked; use movej, movel, movep or servoj") for name in MOVING}
         out |= dict.fromkeys(RESTING, lambda *_, **__: None)
         out |= {name: self._output(name) for name in OUTPUTS}
-        mine = (self.movej, self.movel, self.movep, self.servoj, self.set_tcp, self.sleep)
-        return out | {function.__name__: function for function in mine}
+        mine = (self.movej, self.movel, self.movep, self.servoj, self.set_tcp)
+        return out | {function.__name__: decided(function) for function in mine} | {"sleep": self.sleep}
 
     def movej(self, q: Any, a: float = 1.4, v: float = 1.05, t: float = 0, r: float = 0) -> None:
         self._move("movej", q, a, v, t, r)
@@ -150,11 +145,14 @@ class _Recorder:
             raise ScriptError("set_tcp: p[x, y, z, rx, ry, rz] is needed")
         x = six(pose, "set_tcp")
         _check_pose(x, "set_tcp: ", "from the flange", LONGEST_TOOL)
-        self.said.add("tcp")
+        self.tcp_set = True
         if self.fixed is None:
             self.state.mount = Transform.from_rotation_vector("FT", np.array(x[3:]), np.array(x[:3]))
 
     def sleep(self, t: float) -> None:
+        if isinstance(t, Unknown):
+            self.notes.passed_over(t.what, self._line() or 0, wait=True)
+            return
         if not 0 <= number(t) < np.inf:
             raise ScriptError(f"sleep: {t:g} s must not be negative")
         self.pauses += t
@@ -165,21 +163,21 @@ class _Recorder:
         if not (0 <= number(t) < np.inf and 0 <= number(r) < np.inf):
             raise ScriptError(f"{name}: time {t:g} s and blend radius {r:g} m must not be negative")
         if r > 0:
-            self._note("blend", "blends are not modelled: each motion is checked as if it came to rest at its target")
+            self.notes.add("blend", "blends are not modelled: each motion is checked as if it came to rest at its target")
         self._record(name, target, float(v), float(a), t)
 
     def _record(self, name: Command, target: Any, speed: float, acceleration: float, t: float) -> None:
-        if isinstance(target, _Unknown):
-            bool(target)
         if not isinstance(target, list) or len(target) != 6:
             raise ScriptError(f"{name}: the target must be p[x, y, z, rx, ry, rz] or [six joint angles]")
         values = six(target, f"{name}: target")
         q, X_BT = None, None
         if is_pose(target):
             _check_pose(values, f"{name}: ", "from the base", FURTHEST)
-            if "tcp" not in self.said and self.fixed is None:
-                self._note(
-                    "no tcp", "the program sets no TCP before its first pose: poses are read as the wire's tip (--tool tool0)"
+            if not self.tcp_set and self.fixed is None:
+                self.notes.add(
+                    "no tcp",
+                    "the program sets no TCP before its first pose: poses are read as the wire's tip"
+                    " (--tool tool0 reads them as the bare flange)",
                 )
             X_BT = self.state.to_pose(values) @ X_FT  # the torch hangs on the flange whatever the TCP is
         else:
@@ -193,27 +191,48 @@ class _Recorder:
 
     def _output(self, name: str) -> Callable:
         def switch(n: int, b: bool) -> None:
-            bool(b)
+            if (asked := unknown_among(n, b)) is not None:
+                self.notes.passed_over(asked.what, self._line() or 0, wait=False)
+                return
             (self.on.add if b else self.on.discard)((name.replace("_standard", ""), n))
 
         return switch
 
     def _asking(self, name: str) -> Callable:
-        return lambda *_, **__: _Unknown(name)
+        return lambda *_, **__: Unknown(name)
 
     def _passed_over(self, name: str) -> Callable:
-        def silent(*said: object, **__: object) -> str:
-            if name == "popup" and said:
-                self.shown = " ".join(str(said[0]).split())[:200]
-            self._note(name, f"line {self._line()}: {name} does not move the arm and is passed over")
-            return ""
+        def silent(*said: object, **__: object) -> Unknown:
+            if name == "popup" and said and isinstance(said[0], str):
+                self.shown = " ".join(said[0].split())[:200]
+            self.notes.silent(name, self._line())
+            return Unknown(name)
 
         return silent
 
-    def _note(self, about: str, text: str) -> None:
-        if about not in self.said:
-            self.said.add(about)
-            self.notes.append(text)
+    def _run(self, function: Callable, *_: object) -> Unknown:
+        """Nothing, where a thread does not move the arm; what it changes is unknown from now on. Raises ScriptError."""
+        name = function.__name__.removeprefix("f_")
+        call = None if self.effects is None else self.effects.function_moves(name)
+        if call is not None:
+            raise ScriptError(
+                f"run: thread {name} calls {call.function} (line {call.line}): what a thread moves cannot be told beforehand"
+            )
+        shared = frozenset() if self.effects is None else self.effects.shared_by(name)
+        for variable in shared:
+            self.changing.setdefault(variable, name)
+            self.names.setdefault(f"g_{variable}", Unknown(variable))
+        self.notes.add(f"thread {name}", f"line {self._line()}: thread {name} does not move the arm and is passed over")
+        return Unknown(f"thread {name}")
+
+    def _of_thread(self, variable: str, value: Any) -> Any:
+        thread = self.changing.get(variable)
+        return value if thread is None else Unknown(f"{variable}, which thread {thread} changes")
+
+    def _pass_over(self, untold: UntoldError, kind: str) -> Unknown:
+        """What a statement assigns that moves nothing and depends on something unknown."""
+        self.notes.passed_over(untold.what, self._line() or 0, wait=kind == "While")
+        return Unknown(untold.what)
 
     def _halt(self) -> Iterator[None]:
         raise _HaltError
@@ -230,9 +249,9 @@ class _Recorder:
         """Ends a program that does the same for ever, such as PolyScope's own main loop, after its second round; one that
         only ever goes to one place is left to run out."""
         told = [_told(motion) for motion in self.motions]
-        if len(set(told[-LONGEST_ROUND:])) < 2:
+        if len(set(told)) < 2:
             return
-        for period in range(2, min(LONGEST_ROUND, len(told) // REPEATS) + 1):
+        for period in range(1, min(LONGEST_ROUND, len(told) // REPEATS) + 1):
             if all(told[-k] == told[-k - period] for k in range(1, (REPEATS - 1) * period + 1)):
                 last = len(told) - REPEATS * period
                 while last > 0 and told[last - 1] == told[last - 1 + period]:
@@ -240,7 +259,7 @@ class _Recorder:
                 kept = self.motions[: last + 2 * period]
                 self.pauses *= len(kept) / len(self.motions)
                 self.motions[:] = kept
-                self._note(
+                self.notes.add(
                     "rounds",
                     f"line {kept[-1].line}: the program repeats itself over and over; two rounds are checked, and nothing after",
                 )

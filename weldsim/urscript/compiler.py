@@ -10,6 +10,7 @@ from inspect import isgeneratorfunction, signature, unwrap
 from types import CodeType
 
 from weldsim.urscript import tree
+from weldsim.urscript.effects import Effects
 from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.parser import parse
 from weldsim.urscript.scopes import Scopes, find_scopes, walk
@@ -27,19 +28,24 @@ class Compiled:
         name: of the program.  kind: "def", or "sec" for one that runs beside the main program.
         code: defines `main`, a generator function, once executed with the runtime's names.
         lines: URScript line of each Python line, from 1; entry 0 is not used.
+        effects: of its parts, where it was compiled to be read.
     """
 
     name: str
     kind: str
     code: CodeType
     lines: tuple[int, ...]
+    effects: Effects | None = None
 
 
-def compile_program(text: str, builtins: Mapping[str, Callable]) -> Compiled:
+def compile_program(text: str, builtins: Mapping[str, Callable], *, moving: frozenset[str] | None = None) -> Compiled:
     """A program from its text: one `def` or `sec`, or bare statements.
 
     Args:
         text: the script.  builtins: functions it can call; those that are generator functions take time.
+        moving: for a program that is read and not run: the names of built-in functions that move the arm. A statement that
+            moves nothing may then raise the runtime's `_Untold`: `_pass_over` is told of it, and what it assigns becomes
+            what that returns. A variable that threads assign is read through `_of_thread`.
     Raises:
         ScriptError: with the line.
     """
@@ -53,7 +59,7 @@ def compile_program(text: str, builtins: Mapping[str, Callable]) -> Compiled:
     else:
         name, kind, body = "unnamed", "def", tuple(wanted)
     try:
-        return _Compiler(body, builtins).compile(name, kind)
+        return _Compiler(body, builtins, moving).compile(name, kind)
     except RecursionError:
         raise ScriptError("nested too deeply") from None
 
@@ -64,11 +70,14 @@ def _is_run_program(statement: tree.Statement) -> bool:
 
 
 class _Compiler:
-    def __init__(self, body: tuple[tree.Statement, ...], builtins: Mapping[str, Callable]) -> None:
+    def __init__(
+        self, body: tuple[tree.Statement, ...], builtins: Mapping[str, Callable], moving: frozenset[str] | None
+    ) -> None:
         self._builtins, self._body = builtins, body
         slow = frozenset(name for name, function in builtins.items() if isgeneratorfunction(unwrap(function)))
         self._slow_builtins = slow
         self._scopes: Scopes = find_scopes(body, slow)
+        self._effects = None if moving is None else Effects(self._scopes, moving)
         self._locals: frozenset[str] = frozenset()
         self._out: list[str] = []
         self._lines: list[int] = [0]
@@ -88,7 +97,7 @@ class _Compiler:
             raise ScriptError(error.msg, self._lines[error.lineno] if error.lineno else None) from None
         except MemoryError:  # what Python's own parser says of deep nesting
             raise ScriptError("nested too deeply") from None
-        return Compiled(name, kind, code, tuple(self._lines))
+        return Compiled(name, kind, code, tuple(self._lines), self._effects)
 
     def _emit(self, depth: int, text: str) -> None:
         self._out.append("    " * depth + text)
@@ -119,9 +128,24 @@ class _Compiler:
         for statement in statements:
             if not isinstance(statement, tree.Function):
                 self._line = statement.line
-                self._statement(statement, depth)
+                self._guarded(statement, depth)
         if len(self._out) == before:
             self._emit(depth, "pass")
+
+    def _guarded(self, statement: tree.Statement, depth: int) -> None:
+        """A statement; one that moves nothing is passed over where what it does cannot be told."""
+        effects = self._effects
+        compound = isinstance(statement, tree.If | tree.While)
+        if effects is None or not (compound or effects.calls_functions(statement)) or not effects.can_be_passed_over(statement):
+            self._statement(statement, depth)
+            return
+        self._emit(depth, "try:")
+        self._statement(statement, depth + 1)
+        self._line = statement.line
+        self._emit(depth, "except _Untold as untold:")
+        known = self._locals | self._scopes.shared
+        targets = "".join(f"{self._variable(name)} = " for name in sorted(effects.assigned(statement) & known))
+        self._emit(depth + 1, f"{targets}_pass_over(untold, {type(statement).__name__!r})")
 
     def _statement(self, statement: tree.Statement, depth: int) -> None:
         match statement:
@@ -161,7 +185,10 @@ class _Compiler:
 
     def _read(self, name: str) -> str:
         if name in self._locals or name in self._scopes.shared:
-            return self._variable(name)
+            variable = self._variable(name)
+            if self._effects is not None and name not in self._locals and name in self._effects.of_threads:
+                return f"_of_thread({name!r}, {variable})"
+            return variable
         raise ScriptError(f"variable {name!r} is not defined", self._line)
 
     def _copied(self, value: tree.Expression) -> str:
@@ -194,6 +221,8 @@ class _Compiler:
                 if call.function not in self._scopes.functions:
                     raise ScriptError(f"{call.function!r} is not a thread or function of this program", call.line)
                 return f"_run(f_{call.function}{''.join(f', {self._copied(a)}' for a in call.arguments)})"
+            case tree.Method(target=target, name=name, arguments=arguments):
+                return f"_method({self._value(target)}, {name!r}, [{self._list(arguments)}])"
             case tree.Call():
                 return self._call(value)
 

@@ -1,4 +1,7 @@
-"""Tokens of URScript. Newlines mean nothing, except that a value to be returned stands on the line of its `return`."""
+"""Tokens of URScript. Newlines mean nothing, except that a value to be returned stands on the line of its `return`.
+
+What follows a # is a comment; what follows a $ is the label by which PolyScope knows the line.
+"""
 
 import re
 from dataclasses import dataclass
@@ -40,10 +43,10 @@ KEYWORDS = frozenset(
 )
 
 _TOKEN = re.compile(
-    r"""(?P<space>[ \t\r\f]+|\#[^\n]*|\$[ \t][^\n]*)
+    r"""(?P<space>[ \t\r\f\ufeff\u00a0]+|\#[^\n]*|\$[^\n]*)
     |(?P<newline>\n)
     |(?P<number>0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
-    |(?P<name>[A-Za-z_]\w*)
+    |(?P<name>[^\W\d]\w*)
     |(?P<string>"[^"\n]*"|'[^'\n]*')
     |(?P<symbol>==|!=|<=|>=|[-+*/%<>=()\[\],:^.;])
     """,
@@ -80,6 +83,8 @@ def tokens(text: str) -> list[Token]:
             continue
         if kind == "space":
             continue
+        if kind == "name" and not word.isidentifier():
+            raise ScriptError(f"{word!r} is no name: it may hold letters, digits and _", line)
         if kind == "name" and word in KEYWORDS:
             out.append(Token("keyword", word, line, first))
         elif kind == "string":

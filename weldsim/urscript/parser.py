@@ -60,8 +60,12 @@ class _Parser:
             raise ScriptError(f"expected a name {where}, not {self._said()}", self._next.line)
         return self._take()
 
-    def block(self, until: tuple[str, ...]) -> tuple[tree.Statement, ...]:
-        """Statements up to one of the keywords in `until`, or to the end of the text where it is empty."""
+    def block(self, until: tuple[str, ...], opened: str = "") -> tuple[tree.Statement, ...]:
+        """Statements up to one of the keywords in `until`, or to the end of the text where it is empty.
+
+        Args:
+            opened: what began the block and where, for the error of one that has no end.
+        """
         self._depth += 1
         if self._depth > _MAX_DEPTH:
             raise ScriptError(f"nested deeper than {_MAX_DEPTH}", self._next.line)
@@ -69,10 +73,12 @@ class _Parser:
         while not self._sees(*until):
             if self._next.kind == "end of text":
                 if until:
-                    raise ScriptError(f"expected {' or '.join(until)} before the end of the text", self._next.line)
+                    raise ScriptError(f"expected {' or '.join(until)} of {opened} before the end of the text", self._next.line)
                 break
             if self._accept(";"):
                 continue
+            if not until and self._sees("end"):
+                raise ScriptError("this end closes nothing: no def, thread, if or while is open", self._next.line)
             out.append(self._statement())
         self._depth -= 1
         return tuple(out)
@@ -86,7 +92,7 @@ class _Parser:
         if self._accept("while"):
             condition = self.expression()
             self._expect(":", "after the condition of while")
-            body = self.block(("end",))
+            body = self.block(("end",), f"while (line {token.line})")
             self._take()
             return tree.While(token.line, condition, body)
         if self._accept("return"):
@@ -125,7 +131,7 @@ class _Parser:
             if not self._sees(")"):
                 self._expect(",", f"between the parameters of {name}")
         self._expect(":", f"after {word.text} {name}(...)")
-        body = self.block(("end",))
+        body = self.block(("end",), f"{word.text} {name} (line {word.line})")
         self._take()
         return tree.Function(word.line, word.text, name, tuple(parameters), body)
 
@@ -134,7 +140,8 @@ class _Parser:
         condition: tree.Expression | None = self.expression()
         while True:
             self._expect(":", "after a condition")
-            branches.append((condition, self.block(("end",) if condition is None else ("elif", "else", "end"))))
+            closing = ("end",) if condition is None else ("elif", "else", "end")
+            branches.append((condition, self.block(closing, f"if (line {line})")))
             word = self._take().text
             if word == "end":
                 return tree.If(line, tuple(branches))
@@ -179,11 +186,21 @@ class _Parser:
         if self._depth > _MAX_DEPTH:
             raise ScriptError(f"nested deeper than {_MAX_DEPTH}", self._next.line)
         value = self._atom()
-        while self._sees("["):
-            line = self._take().line
-            value = tree.Index(line, value, self._items("]"))
+        while (token := self._accept("[", ".")) is not None:
+            if token.text == "[":
+                value = tree.Index(token.line, value, self._items("]"))
+            else:
+                value = self._method(value)
         self._depth -= 1
         return value
+
+    def _method(self, target: tree.Expression) -> tree.Method:
+        """What follows the dot of `target.name(x)`."""
+        name = self._name("after .")
+        if not self._sees("("):
+            raise ScriptError(f"expected '(' after .{name.text}: structs are not known, only calls of rpc_factory's handles", name.line)
+        call = self._call(name)
+        return tree.Method(name.line, target, name.text, (*call.arguments, *(value for _, value in call.named)))
 
     def _atom(self) -> tree.Expression:
         token = self._take()

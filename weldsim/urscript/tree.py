@@ -55,13 +55,22 @@ class Call(Node):
 
 
 @dataclass(frozen=True)
+class Method(Node):
+    """`target.name(x)`: a function of a remote procedure server."""
+
+    target: "Expression"
+    name: str
+    arguments: "tuple[Expression, ...]"
+
+
+@dataclass(frozen=True)
 class Run(Node):
     """`run f(x)`: the handle of a new thread."""
 
     call: Call
 
 
-Expression = Constant | Name | ListLiteral | PoseLiteral | Index | Unary | Binary | Call | Run
+Expression = Constant | Name | ListLiteral | PoseLiteral | Index | Unary | Binary | Call | Method | Run
 
 
 @dataclass(frozen=True)
