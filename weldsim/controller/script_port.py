@@ -1,11 +1,12 @@
 """The script ports, 30001 to 30003: programs out of the text that a client sends, in whatever pieces it comes."""
 
 import re
+from codecs import getincrementaldecoder
 
 from weldsim.controller.machine import Machine
 
 MAX_TEXT = 4_000_000  # [character]
-_WORD = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|\#[^\n]*|[A-Za-z_]\w*|\n|.", re.DOTALL)
+_WORD = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|[#$][^\n]*|[^\W\d]\w*|\n|.", re.DOTALL)
 _OPENING = frozenset(("def", "thread", "sec", "if", "while"))
 
 
@@ -25,7 +26,7 @@ def split_programs(text: str) -> tuple[list[str], str]:
         elif word == "\n" and depth == 0:
             programs.append(text[start : match.end()])
             start = match.end()
-    kept = [program for program in programs if re.sub(r"#[^\n]*", "", program).strip()]
+    kept = [program for program in programs if re.sub(r"[#$][^\n]*", "", program).strip()]
     return kept, text[start:]
 
 
@@ -34,6 +35,7 @@ class ScriptSession:
 
     def __init__(self, machine: Machine) -> None:
         self._machine, self._text = machine, ""
+        self._decoder = getincrementaldecoder("utf-8")(errors="replace")  # letters that are not UTF-8 are in comments at most
 
     def greeting(self) -> bytes:
         return b""
@@ -43,7 +45,7 @@ class ScriptSession:
 
     def received(self, data: bytes) -> bytes:
         """Nothing, after the programs that are complete have been started."""
-        self._text += data.decode(errors="replace").replace("\r\n", "\n")
+        self._text += self._decoder.decode(data).replace("\r\n", "\n")
         programs, self._text = split_programs(self._text)
         for program in programs:
             if program.strip() != "run program":

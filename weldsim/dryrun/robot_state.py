@@ -46,6 +46,9 @@ class RobotState:
     def get_target_tcp_pose(self) -> Pose:
         return self._tcp_pose("get_target_tcp_pose")
 
+    def get_actual_tool_flange_pose(self) -> Pose:
+        return _pose(self._since[-1] if self._since else flange_pose(self._joints("get_actual_tool_flange_pose")))
+
     def get_tcp_offset(self) -> Pose:
         return _pose(self.mount)
 

@@ -21,13 +21,13 @@ ASKING = _words(
     get_tcp_force force get_joint_torques get_joint_temp get_actual_joint_speeds get_target_joint_speeds
     get_actual_joint_positions_history get_actual_tcp_speed get_target_tcp_speed get_target_waypoint get_controller_temp
     get_tool_current get_tool_accelerometer_reading get_target_payload get_target_payload_cog get_target_payload_inertia
-    get_target_tcp_pose_along_path get_target_tcp_speed_along_path get_freedrive_status path_offset_get
+    get_target_tcp_speed_along_path get_freedrive_status path_offset_get
     read_input_integer_register read_input_float_register read_input_boolean_register read_output_integer_register
     read_output_float_register read_output_boolean_register read_port_bit read_port_register modbus_get_signal_status
     modbus_get_error modbus_get_time_since_signal_invalid socket_open socket_read_string socket_read_line
     socket_read_ascii_float socket_read_byte_list socket_read_binary_integer socket_get_var
     request_boolean_from_primary_client request_integer_from_primary_client request_float_from_primary_client
-    request_string_from_primary_client is_steady tool_contact tool_contact_examples get_steptime time random rpc_factory
+    request_string_from_primary_client is_steady tool_contact tool_contact_examples get_steptime random rpc_factory
     get_conveyor_tick_count encoder_get_tick_count encoder_unwind_delta_tick_count get_inverse_kin_has_solution
     is_within_safety_limits
     """

@@ -70,9 +70,7 @@ def _is_run_program(statement: tree.Statement) -> bool:
 
 
 class _Compiler:
-    def __init__(
-        self, body: tuple[tree.Statement, ...], builtins: Mapping[str, Callable], moving: frozenset[str] | None
-    ) -> None:
+    def __init__(self, body: tuple[tree.Statement, ...], builtins: Mapping[str, Callable], moving: frozenset[str] | None) -> None:
         self._builtins, self._body = builtins, body
         slow = frozenset(name for name, function in builtins.items() if isgeneratorfunction(unwrap(function)))
         self._slow_builtins = slow
@@ -135,8 +133,7 @@ class _Compiler:
     def _guarded(self, statement: tree.Statement, depth: int) -> None:
         """A statement; one that moves nothing is passed over where what it does cannot be told."""
         effects = self._effects
-        compound = isinstance(statement, tree.If | tree.While)
-        if effects is None or not (compound or effects.calls_functions(statement)) or not effects.can_be_passed_over(statement):
+        if effects is None or not effects.decides(statement) or not effects.can_be_passed_over(statement):
             self._statement(statement, depth)
             return
         self._emit(depth, "try:")

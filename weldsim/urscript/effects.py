@@ -65,10 +65,16 @@ class Effects:
         """
         return not _leaves(statement, inside_loop=False) and self.moves(statement) is None
 
-    def calls_functions(self, statement: tree.Statement) -> bool:
-        """Whether a statement calls functions of the program."""
-        functions = self._scopes.functions
-        return bool(functions) and any(isinstance(node, tree.Call) and node.function in functions for node in walk(statement))
+    def decides(self, statement: tree.Statement) -> bool:
+        """Whether a statement may be unable to go on where a value is unknown: it decides by one, or calls a function that may."""
+        for node in walk(statement, into_functions=False):
+            if isinstance(node, tree.If | tree.While) or (isinstance(node, tree.Unary) and node.operator == "not"):
+                return True
+            if isinstance(node, tree.Binary) and node.operator in ("and", "or"):
+                return True
+            if isinstance(node, tree.Call) and node.function in self._scopes.functions:
+                return True
+        return False
 
 
 def _leaves(statement: tree.Statement, inside_loop: bool) -> bool:

@@ -187,10 +187,7 @@ class _Parser:
             raise ScriptError(f"nested deeper than {_MAX_DEPTH}", self._next.line)
         value = self._atom()
         while (token := self._accept("[", ".")) is not None:
-            if token.text == "[":
-                value = tree.Index(token.line, value, self._items("]"))
-            else:
-                value = self._method(value)
+            value = tree.Index(token.line, value, self._items("]")) if token.text == "[" else self._method(value)
         self._depth -= 1
         return value
 
@@ -198,7 +195,9 @@ class _Parser:
         """What follows the dot of `target.name(x)`."""
         name = self._name("after .")
         if not self._sees("("):
-            raise ScriptError(f"expected '(' after .{name.text}: structs are not known, only calls of rpc_factory's handles", name.line)
+            raise ScriptError(
+                f"expected '(' after .{name.text}: structs are not known, only calls of rpc_factory's handles", name.line
+            )
         call = self._call(name)
         return tree.Method(name.line, target, name.text, (*call.arguments, *(value for _, value in call.named)))
 

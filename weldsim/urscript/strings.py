@@ -4,11 +4,20 @@ from math import isfinite
 from typing import Any
 
 from weldsim.urscript.errors import ScriptError
-from weldsim.urscript.values import number, type_name
+from weldsim.urscript.values import Pose, number, type_name
 
 
 class StringFunctions:
-    """Parts of texts, and numbers out of them."""
+    """Texts of values, parts of texts, and numbers out of them."""
+
+    def to_str(self, val: Any) -> str:
+        return to_text(val)
+
+    def str_cat(self, op1: Any, op2: Any) -> str:
+        return f"{to_text(op1)}{to_text(op2)}"
+
+    def str_len(self, str: str) -> int:
+        return len(_text(str))
 
     def str_empty(self, str: str) -> bool:
         return not _text(str)
@@ -41,6 +50,16 @@ class StringFunctions:
         if not isfinite(value):
             raise ScriptError(f"to_num: {text!r} is no number")
         return int(text) if text.lstrip("+-").isdigit() else value
+
+
+def to_text(value: Any) -> str:
+    """A value as `textmsg` writes it."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        inner = ", ".join(to_text(item) for item in value)
+        return f"{'p' if type(value) is Pose else ''}[{inner}]"
+    return str(value)
 
 
 def _text(value: Any) -> str:

@@ -78,6 +78,11 @@ def item(value: Any, indices: tuple[Any, ...]) -> Any:
     return value
 
 
+def call_method(target: Any, name: str, arguments: list[Any]) -> None:
+    """Raises ScriptError: no server of remote procedures answers."""
+    raise ScriptError(f".{name}(): no server answers here; functions of rpc_factory's handles are not modelled")
+
+
 def store(value: Any, indices: tuple[Any, ...], new: Any) -> None:
     """value[i] = new. Raises ScriptError for an index that is not there."""
     holder = item(value, indices[:-1])
@@ -101,6 +106,7 @@ OPERATIONS = {
     "_negate": negate,
     "_item": item,
     "_store": store,
+    "_method": call_method,
     "_own": own,
     "_pose": make_pose,
 }

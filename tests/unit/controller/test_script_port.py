@@ -3,6 +3,7 @@
 import pytest
 
 from tests.controllers import new_machine
+from tests.polyscope_programs import COUNTER, GRIPPER, HEAD_3, HEAD_5, TIMER, exported
 from weldsim.controller.script_port import ScriptSession, split_programs
 
 NESTED = "def job():\n  # an end in a comment: end\n  if True:\n    textmsg('end')\n  end\n  while False: end\nend\n"
@@ -49,3 +50,37 @@ def test_output_that_the_installation_drops_is_low_once_no_program_runs():
     assert machine.io.digital_out == 1 | 1 << 5
     machine.stop_program()
     assert machine.io.digital_out == 1 << 5
+
+
+@pytest.mark.parametrize("size", [1, 1000])
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize(
+    ("series", "text"),
+    [
+        ("cb3", exported(HEAD_3, COUNTER, GRIPPER, TIMER)),
+        ("e", exported(HEAD_5, COUNTER, TIMER, GRIPPER)),
+    ],
+)
+def test_a_program_that_polyscope_exported_runs_to_its_end(series, text, size, encoding):
+    machine = new_machine(series)
+    session = ScriptSession(machine)
+    text = text.replace('"Robot Program"', '"Schweißen if"').replace("≟", "=")
+    data = f'# für den "end"\r\n{text}'.encode(encoding)
+    for k in range(0, len(data), size):
+        session.received(data[k : k + size])
+    assert machine.program_name == "Weld_1", machine.log
+    for _ in range(round(20.0 / machine.profile.period)):
+        machine.tick()
+        if not machine.program_name:
+            break
+    assert not machine.program_name
+    assert not [said for _, said in machine.log if "failed" in said or "refused" in said or "stop" in said]
+    tip = machine.snapshot.tcp_pose[:3]
+    assert tip == pytest.approx([-0.03, -0.45, 0.2], abs=1e-3)
+
+
+def test_a_server_that_is_not_there_is_not_asked_in_vain():
+    machine = new_machine("e")
+    machine.upload('def job():\n rpc = rpc_factory("xmlrpc", "http://127.0.0.1:1")\n x = rpc.ready()\nend\n')
+    machine.tick()
+    assert "no server answers" in machine.log[-1][1]

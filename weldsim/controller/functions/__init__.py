@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from weldsim.controller.functions.accepted import accepted
 from weldsim.controller.functions.geometry import GeometryFunctions
 from weldsim.controller.functions.installation import InstallationFunctions
 from weldsim.controller.functions.motion import MotionFunctions
@@ -15,7 +16,6 @@ from weldsim.urscript.strings import StringFunctions
 
 E_ONLY = frozenset(
     [
-        "get_steptime",
         "tool_contact",
         "get_actual_joint_positions_history",
         "get_target_payload",
@@ -26,6 +26,14 @@ E_ONLY = frozenset(
         "get_target_waypoint",
         "get_freedrive_status",
         "ft_rtde_input_enable",
+        "set_tool_communication",
+        "set_tool_output_mode",
+        "set_tool_digital_output_mode",
+        "high_holding_torque_enable",
+        "high_holding_torque_disable",
+        "modbus_add_rw_signal",
+        "modbus_request_update_signal_value",
+        "modbus_reset_connection",
     ]
 )
 """Functions that a CB3 controller does not have."""
@@ -44,5 +52,6 @@ def builtins(machine: Machine) -> dict[str, Callable]:
         NumberFunctions(),
         StringFunctions(),
     )
-    found = {name: getattr(group, name) for group in groups for name in dir(group) if not name.startswith("_")}
+    found = accepted(machine)
+    found |= {name: getattr(group, name) for group in groups for name in dir(group) if not name.startswith("_")}
     return {name: f for name, f in found.items() if machine.profile.series == "e" or name not in E_ONLY}

@@ -6,6 +6,7 @@ from typing import Any
 from weldsim.controller.inputs import input_type
 from weldsim.controller.machine import Machine
 from weldsim.urscript.errors import ScriptError
+from weldsim.urscript.strings import to_text
 from weldsim.urscript.values import number
 
 
@@ -56,22 +57,3 @@ class SystemFunctions:
 
     def powerdown(self) -> None:
         """Nothing: the virtual controller stays on."""
-
-    def to_str(self, val: Any) -> str:
-        return to_text(val)
-
-    def str_cat(self, op1: Any, op2: Any) -> str:
-        return f"{to_text(op1)}{to_text(op2)}"
-
-    def str_len(self, str: str) -> int:
-        return len(str)
-
-
-def to_text(value: Any) -> str:
-    """A value as `textmsg` writes it."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, list):
-        inner = ", ".join(to_text(item) for item in value)
-        return f"{'p' if type(value).__name__ == 'Pose' else ''}[{inner}]"
-    return str(value)
