@@ -1,13 +1,14 @@
 """Files to programs: `weldsim.path/1`, CSV of UR poses, URScript; anything else is refused in one line."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.columns import decode
 from weldsim.curves import arc_length
+from weldsim.dryrun.pose_table import FURTHEST, read_poses
 from weldsim.dryrun.program import Base, Program, Tool
 from weldsim.dryrun.urscript import parse_script
 from weldsim.errors import InputError
@@ -15,13 +16,11 @@ from weldsim.frames import Transform
 from weldsim.mounts import X_FT
 from weldsim.path.files import read_path_json, torch_paths
 from weldsim.quantity import MetrePerSecond
-from weldsim.records import MILLIMETRE_SPAN, Segment, TorchPath
+from weldsim.records import Segment, TorchPath
 
 SCRIPTS = (".script", ".urscript", ".ur")
-LONGEST_TURN = 2 * np.pi + 1e-6  # [rad] of a rotation vector
+TABLES = (".csv", ".txt", ".tsv")
 SHORTEST = 1e-6  # [m] of a path
-FURTHEST = 3.0  # [m] from the base: further is a unit mistaken
-POSE = re.compile(r"\s*p?\[(.*)\]\s*")  # a pose as robot programs write it
 HALF_TURN = Transform("BB", np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
 
 
@@ -65,7 +64,7 @@ def read_program(
     text = _text(path)
     if path.suffix.lower() in SCRIPTS:
         return parse_script(text, source=str(path), X_FT=None if tool is None else _mount(tool), q_start=q_start)
-    if path.suffix.lower() in (".csv", ".txt"):
+    if path.suffix.lower() in TABLES:
         return _csv(path, text, tool, base, speed, bool(roll_free))
     raise InputError(f"{path}: .json (weldsim.path/1), .csv (UR poses) or .script (URScript) is needed", path=str(path))
 
@@ -88,24 +87,21 @@ def _mount(tool: Tool) -> Transform:
 
 
 def _text(path: Path) -> str:
+    """The text of a file in whatever encoding: only comments and names can differ by it."""
     try:
-        return path.read_text(encoding="utf-8-sig")
+        text = decode(path.read_bytes())
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})", path=str(path)) from error
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is no UTF-8 text", path=str(path)) from None
+    if "\0" in text:
+        raise InputError(f"{path}: is no text", path=str(path))
+    return text
 
 
 def _csv(path: Path, text: str, tool: Tool | None, base: Base, speed: MetrePerSecond, roll_free: bool) -> Program:
-    rows = [(number, row.strip()) for number, row in enumerate(text.splitlines(), 1) if row.strip()]
-    comments = " ".join(row for _, row in rows if row.startswith("#"))
-    body = [(number, _cells(row.partition("#")[0])) for number, row in rows if not row.startswith("#")]
-    head: list[str] = []
-    if body and all(_number(cell) is None for cell in body[0][1][-6:]):
-        head, body = _head(path, *body[0]), body[1:]
-    labels, poses = _poses(path, head, body)
-    told = "tool0" if "tool0" in comments else "torch" if "torch" in comments else None
-    notes = []
+    table = read_poses(text, str(path))
+    poses, labels = table.poses, table.labels or (path.stem,) * len(table.poses)
+    told = "tool0" if "tool0" in table.comments else "torch" if "torch" in table.comments else None
+    notes = [table.note] if table.note else []
     if tool is None and told is None:
         notes.append(
             "the file does not say which frame its poses are of: read as tool0 (--tool torch reads them as the wire's tip)"
@@ -136,84 +132,3 @@ def _csv(path: Path, text: str, tool: Tool | None, base: Base, speed: MetrePerSe
             raise InputError(f"{path}: {name}: all {len(mine)} poses are in one place; a path has a length", path=str(path))
         names.append(name)
     return Program(source=path.name, kind="csv", paths=tuple(paths), names=tuple(names), notes=tuple(notes))
-
-
-def _poses(path: Path, head: list[str], body: list[tuple[int, list[str]]]) -> tuple[list[str], Float[ndarray, "n 6"]]:
-    """Label and UR pose of each row, checked."""
-    if len(body) < 2:
-        raise InputError(f"{path}: {len(body)} poses; a path needs two", path=str(path))
-    columns = list(range(-6, 0))
-    if head:
-        wanted = ("x", "y", "z", "rx", "ry", "rz")
-        missing = [name for name in wanted if name not in head]
-        if missing:
-            raise InputError(f"{path}: column {missing[0]} is missing; x y z rx ry rz [m, rad] are needed", path=str(path))
-        columns = [head.index(name) for name in wanted]
-    labels, poses = [], []
-    for number, cells in body:
-        if len(cells) != (len(head) or 6):
-            raise InputError(
-                f"{path}: line {number}: {len(cells)} columns, expected {len(head) or 6}: x y z rx ry rz [m, rad]"
-                + (" (x y z and a quaternion are no UR pose)" if len(cells) == 7 else "")
-                + (" (decimal commas need ; between the columns)" if len(cells) == 12 else ""),
-                path=str(path),
-                line=number,
-            )
-        values = [_number(cells[k]) for k in columns]
-        if any(value is None or not np.isfinite(value) for value in values):
-            raise InputError(f"{path}: line {number}: a number is missing or not finite", path=str(path), line=number)
-        labels.append(cells[head.index("seam")].strip() if "seam" in head else path.stem)
-        poses.append(values)
-    table = np.array(poses, float)
-    check_poses(table, str(path), [number for number, _ in body])
-    return labels, table
-
-
-def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> None:
-    """Nothing, when UR poses are in metres and radians. Raises InputError naming the line."""
-    far = np.linalg.norm(poses[:, :3], axis=1)
-    if far.max() > FURTHEST or np.ptp(poses[:, :3], axis=0).max() > MILLIMETRE_SPAN:
-        worst = int(far.argmax())
-        raise InputError(
-            f"{where}: line {lines[worst]}: {far[worst]:.4g} m from the base (limit {FURTHEST:g} m): looks like millimetres",
-            line=lines[worst],
-            value=float(far[worst]),
-        )
-    turn = np.linalg.norm(poses[:, 3:], axis=1)
-    if turn.max() > LONGEST_TURN:
-        worst = int(turn.argmax())
-        raise InputError(
-            f"{where}: line {lines[worst]}: rotation vector of length {turn[worst]:.4g} (limit 2 pi): looks like degrees",
-            line=lines[worst],
-            value=float(turn[worst]),
-        )
-
-
-def _cells(row: str) -> list[str]:
-    """A row's cells, between semicolons or tabs (numbers may then have decimal commas), commas, or blanks."""
-    mark = next((mark for mark in (";", "\t", ",") if mark in row), None)
-    if (written := POSE.fullmatch(row)) is not None:
-        row = written.group(1)
-    if mark is not None:
-        row = row.rstrip().removesuffix(mark)  # some programs end every row with one
-    cells = row.split(mark)
-    return [cell.strip().strip('"').replace(",", ".") for cell in cells]
-
-
-def _head(path: Path, number: int, cells: list[str]) -> list[str]:
-    """Names of the columns; a unit in brackets may follow each."""
-    names = []
-    for cell in cells:
-        name, _, unit = cell.lower().replace("(", "[").partition("[")
-        if (unit := unit.strip(" ])")) not in ("", "m", "rad", "m/s"):
-            message = f"{path}: line {number}: column {name.strip()} is in {unit}; metres and radians are needed"
-            raise InputError(message, path=str(path), line=number)
-        names.append(name.strip())
-    return names
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from tests.torch_paths import flat_curve, torch_path
+from weldsim.dryrun.cell import empty_cell
 from weldsim.dryrun.read import read_program
+from weldsim.dryrun.try_script import try_script
 from weldsim.errors import InputError
 from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.mounts import X_FT
+from weldsim.scene.world import HOME as HOME_ARM
 
 POSE = "0.0,-0.45,0.1,3.1,0.0,0.0"
 
@@ -233,3 +236,88 @@ def test_a_program_that_repeats_itself_for_ever_is_read_for_two_rounds(tmp_path)
         read_program(file)
     file.write_text("i = 0\nwhile i < 1200:\n  movej([0, 0, 0, 0, 0, i / 1000])\n  i = i + 1\nend\n")
     assert len(read_program(file).motions) == 1200
+
+
+ROWS = np.array([[0.1, -0.45, 0.1, 3.1, 0.0, 0.01], [0.12, -0.45, 0.1, 3.1, 0.0, 0.01], [0.14, -0.452, 0.1, 3.1, 0.01, 0.02]])
+
+
+def _table(head: str, order: list[int], mark: str = ",", comma: bool = False, extra: tuple[str, ...] = ()) -> str:
+    rows = [mark.join([*extra, *(f"{row[k]:g}" for k in order)]) for row in ROWS]
+    return "\n".join([head, *(row.replace(".", ",") if comma else row for row in rows)])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _table("x,y,z,rx,ry,rz", [0, 1, 2, 3, 4, 5]),
+        _table("rx;ry;rz;x;y;z", [3, 4, 5, 0, 1, 2], ";", comma=True),
+        _table("Z [m]\tY [m]\tX [m]\tRZ [rad]\tRY [rad]\tRX [rad]", [2, 1, 0, 5, 4, 3], "\t", comma=True),
+        _table("pos_x pos_y pos_z rot_x rot_y rot_z", [0, 1, 2, 3, 4, 5], " "),
+        _table("t;TCP_X (m);TCP_Y (m);TCP_Z (m);TCP_Rx (rad);TCP_Ry (rad);TCP_Rz (rad)", [0, 1, 2, 3, 4, 5], ";", extra=("0.008",)),
+        _table("timestamp " + " ".join(f"actual_TCP_pose_{k}" for k in range(6)), [0, 1, 2, 3, 4, 5], " ", extra=("17.25",)),
+        _table("seam,s,x,y,z,rx,ry,rz", [0, 1, 2, 3, 4, 5], extra=("weld", "0")),
+        _table("% Schweißnaht; 5 µm", [0, 1, 2, 3, 4, 5], ";", comma=True),
+        _table("# x y z rx ry rz", [0, 1, 2, 3, 4, 5], "  ", comma=True) + "\n\n",
+        "Export vom Montag\n" + _table("x;y;z;rx;ry;rz", [0, 1, 2, 3, 4, 5], ";", comma=True),
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_names_orders_decimal_commas_and_encodings_of_a_table(tmp_path, text, encoding, newline) -> None:
+    file = tmp_path / "poses.csv"
+    file.write_bytes(text.replace("\n", newline).encode(encoding))
+    X_BT = read_program(file, tool="torch").paths[0].X_BT
+    assert np.abs(np.column_stack([X_BT.p, X_BT.rotation_vector]) - ROWS).max() < 1e-9
+
+
+ANGLES = np.rad2deg([[-1.57, -1.3, -1.9, -1.5, 1.57, 0.0], [-1.5, -1.3, -1.9, -1.5, 1.57, 0.1]])
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        (ANGLES, "line [12]: .*looks like six joint angles in degrees, or millimetres and degrees"),
+        (ROWS * [1e3, 1e3, 1e3, 1, 1, 1], "looks like millimetres; x y z"),
+        (ROWS * [1, 1, 1, 57.3, 57.3, 57.3], "looks like degrees; x y z"),
+        (ROWS * [1e4, 1e4, 1e4, 57.3, 57.3, 57.3], "looks like millimetres and degrees; x y z"),
+    ],
+)
+def test_numbers_of_another_unit_are_called_what_they_are(tmp_path, rows, says) -> None:
+    file = tmp_path / "poses.csv"
+    np.savetxt(file, rows, delimiter=",")
+    with pytest.raises(InputError, match=says) as caught:
+        read_program(file)
+    assert "\n" not in str(caught.value)
+
+
+def test_joint_angles_go_into_a_script_as_the_message_says(tmp_path) -> None:
+    file = tmp_path / "poses.csv"
+    np.savetxt(file, ANGLES, delimiter=",")
+    with pytest.raises(InputError, match=r"joint angles: movej\(\[d2r\(\.\.\.\), \.\.\.\]\) in a \.script"):
+        read_program(file)
+    script = tmp_path / "angles.script"
+    script.write_text("\n".join(f"movej([{', '.join(f'd2r({value})' for value in row)}])" for row in ANGLES))
+    assert np.allclose([motion.q for motion in read_program(script).motions], np.deg2rad(ANGLES))
+    file.write_text("base,shoulder,elbow,wrist1,wrist2,wrist3\n" + file.read_text())
+    with pytest.raises(InputError, match="these are joint angles"):
+        read_program(file)
+    np.savetxt(file, np.deg2rad(ANGLES), delimiter=",")
+    assert any("if these are six joint angles" in note for note in read_program(file).notes)
+
+
+@pytest.mark.parametrize("tool", ["torch", "tool0"])
+@pytest.mark.parametrize("name", ["bare.script", "bare.csv"])
+def test_the_option_that_a_note_recommends_is_taken_and_the_note_is_gone(tmp_path, name, tool) -> None:
+    file = tmp_path / name
+    poses = ["0.0,-0.45,0.3,3.1,0.0,0.0", "0.05,-0.45,0.3,3.1,0.0,0.0"]
+    file.write_text("\n".join(f"movel(p[{pose}])" if name.endswith("script") else pose for pose in poses))
+    plain = read_program(file)
+    assert any(f"--tool {'tool0' if name.endswith('script') else 'torch'}" in note for note in plain.notes)
+    chosen = read_program(file, tool=tool)
+    assert not any("--tool" in note for note in chosen.notes)
+    X_BT = chosen.motions[0].X_BT if chosen.motions else chosen.paths[0].X_BT[0]
+    assert X_BT is not None
+    said = X_BT.p if tool == "torch" else (X_BT @ X_FT.inverse()).p
+    assert said == pytest.approx([0.0, -0.45, 0.3], abs=1e-9)
+    if chosen.motions:
+        assert len(try_script(chosen, empty_cell(np.array(HOME_ARM))).verdicts) == len(poses)
