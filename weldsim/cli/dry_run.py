@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from weldsim.motion.config import MotionConfig
     from weldsim.records import TorchPath
 
-TOLD = 12  # failures in full
+TOLD = 40  # failures in full
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,11 +250,21 @@ class DryRunCommand(ConfigOptions):
 
 
 def failures(trial: "Trial") -> list[list[str]]:
-    """Lines of a table of what failed, TOLD of them at most."""
+    """Lines of a table of all that failed, TOLD of them at most; what is not reached is named once, after them."""
     from weldsim.dryrun.verdict import runs
 
     bad = [(a, b) for a, b in runs(trial.verdicts) if not a.ok]
-    return [_row(a, b) for a, b in bad[:TOLD]]
+    own = [pair for pair in bad if pair[0].why != "not reached"]
+    rows = [_row(a, b) for a, b in own[:TOLD]]
+    if len(own) > TOLD:
+        rows.append([f"{len(own) - TOLD} more", "", "", "all are in --out and --html"])
+    late = [pair for pair in bad if pair[0].why == "not reached"]
+    count = sum(b.index - a.index + 1 for a, b in late)
+    if len(late) == 1:
+        rows.append(_row(*late[0]))
+    elif late:
+        rows.append([f"{count} others", "", "not reached", late[0][0].text])
+    return rows
 
 
 def _row(first: "Verdict", last: "Verdict") -> list[str]:

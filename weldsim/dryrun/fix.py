@@ -10,9 +10,10 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell, shifted
+from weldsim.dryrun.path_faults import FASTEST
 from weldsim.dryrun.program import Program
 from weldsim.dryrun.sieve import quick
-from weldsim.dryrun.try_path import FASTEST, try_path
+from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import Fix, Trial
 from weldsim.errors import MotionError
@@ -48,7 +49,7 @@ def fixes_for_path(
 ) -> tuple[Fix, ...]:
     """What would help a path that failed: a slower weld, a turn about the wire, a place for the part, cuts; all verified."""
     failure = trial.failure
-    if failure is None or failure.why == "orientation jump":
+    if failure is None or failure.why in ("orientation jump", "turns back"):
         return ()
     if failure.why == "stale start":
         config = replace(config, candidates=min(config.candidates, CANDIDATES))

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
 from weldsim.dryrun.program import Program
-from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import DryRun
+from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.motion.config import MotionConfig
 
 
@@ -34,7 +34,7 @@ def dry_run(
         fixes.append(fixes_for_script(program, trials[0], cell, lambda done: tell("fixes", done)) if fix else ())
     for path, name in zip(program.paths, program.names, strict=True):
         tell(name, None)
-        trial = try_path(path, name, cell, config)
+        followed, trial = try_waypoints(path, name, cell, config)
         trials.append(trial)
-        fixes.append(fixes_for_path(path, trial, cell, config, lambda done: tell("fixes", done)) if fix else ())
+        fixes.append(fixes_for_path(followed, trial, cell, config, lambda done: tell("fixes", done)) if fix else ())
     return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=program.notes)

@@ -1,44 +1,40 @@
 """A torch path tried: every waypoint judged on its own, then the whole motion planned."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell
+from weldsim.dryrun.path_faults import Fault, path_faults
 from weldsim.dryrun.verdict import Trial, Verdict, Why
 from weldsim.errors import MotionError
 from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
-from weldsim.motion.collision import Touch
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.motion.rail import Rail, make_rail
 from weldsim.motion.rungs import Refusal, Rungs, make_rungs
-from weldsim.records import TorchPath
+from weldsim.records import Segment, TorchPath
 
 FINE = 0.001  # [m] to which the first place that fails is found
-FASTEST = 0.25  # [m/s] greatest torch speed with the arc, the safety limit of manual mode
-JUMP = np.deg2rad(2.0)  # [rad] two poses may always differ by so much
+RAMP_MARGIN = 0.0005  # [m] beside a ramp of the tip's speed in which a pose is not called slow
 EXACT_ROLLS = 360  # rotations about the wire of the look that refuses
 
 
 def try_path(path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Trial:
     """A verdict for every waypoint of the path, and the motion where it can be done."""
-    points, length = path.X_BT.p, float(path.s[-1] - path.s[0])
-    base = Trial(name=name, verdicts=_all(path), points_B=points, length=length)
-    fault = _spoilt(path, cell, config)
-    if fault is not None:
-        stale = cell.q_start if fault.why == "stale start" else None
-        return replace(base, verdicts=_ended(path, fault), p_worst=points[fault.index], q_worst=stale)
+    base = Trial(name=name, verdicts=_all(path), points_B=path.X_BT.p, length=float(path.s[-1] - path.s[0]))
+    start, faults = _bad_start(cell), path_faults(path, config)
+    if start is not None or faults:
+        return _spoilt(base, path, start, faults, cell, config)
     try:
         rail = make_rail(path, config)
     except MotionError as error:
         index = int(str(error.data.get("index", 0)))
-        return replace(
-            base, verdicts=_ended(path, _Fault(index=index, why="orientation jump", text=str(error))), p_worst=points[index]
-        )
+        fault = Fault(index=index, why="orientation jump", text=str(error))
+        return replace(base, verdicts=_ended(path, [fault]), p_worst=path.X_BT.p[index])
     rungs = make_rungs(rail, cell.arm, config, cell.collision)
     if rungs.first_refused is not None:
         found = _first_refused(rail, rungs, cell, config)
@@ -57,67 +53,77 @@ def _all(path: TorchPath) -> tuple[Verdict, ...]:
     return tuple(Verdict(label=f"pose {i}", index=i, s=float(s)) for i, s in enumerate(path.s))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Fault:
-    """Why a pose fails. Attributes: index of the pose; why; text; touch, the bodies where any collide."""
-
-    index: int
-    why: Why
-    text: str
-    touch: Touch | None = None
-
-
-def _failing(verdict: Verdict, fault: _Fault) -> Verdict:
+def _failing(verdict: Verdict, fault: Fault) -> Verdict:
     first, second, depth = ("", "", 0.0) if fault.touch is None else (fault.touch.first, fault.touch.second, fault.touch.depth)
     return replace(verdict, why=fault.why, text=fault.text, first=first, second=second, depth=depth)
 
 
-def _ended(path: TorchPath, fault: _Fault) -> tuple[Verdict, ...]:
-    """Verdicts of a motion that ends at one pose: those after it are not reached."""
-    verdicts = _all(path)
-    late = {"why": "not reached", "text": f"the motion ends at pose {fault.index}"}
-    return (
-        *verdicts[: fault.index],
-        _failing(verdicts[fault.index], fault),
-        *(replace(verdict, **late) for verdict in verdicts[fault.index + 1 :]),  # type: ignore[arg-type]
-    )
+def _ended(path: TorchPath, faults: list[Fault]) -> tuple[Verdict, ...]:
+    """Verdicts of a motion that ends at the first of these faults: the poses after it are not reached, but for the others."""
+    first = min(fault.index for fault in faults)
+    late = {"why": "not reached", "text": f"the motion ends at pose {first}"}
+    verdicts = [replace(verdict, **late) if verdict.index > first else verdict for verdict in _all(path)]  # type: ignore[arg-type]
+    for fault in faults:
+        verdicts[fault.index] = _failing(_all(path)[fault.index], fault)
+    return tuple(verdicts)
 
 
-def _spoilt(path: TorchPath, cell: Cell, config: MotionConfig) -> _Fault | None:
-    """What is wrong before any posture is looked for: the start, the speed, jumps of orientation."""
+def _bad_start(cell: Cell) -> Fault | None:
+    """What is wrong with where the arm stands."""
     over = np.abs(cell.q_start) > JOINT_LIMIT
     if over.any():
         joint = int(np.flatnonzero(over)[0])
         degrees = np.rad2deg(cell.q_start[joint])
-        return _Fault(
+        return Fault(
             index=0,
             why="stale start",
             text=f"the arm is said to stand with {JOINT_NAMES[joint]} at {degrees:.0f} deg (limit +-360 deg)",
         )
     if (touch := cell.collision.touch(cell.q_start)) is not None:
         text = f"where the arm stands {touch}; drive it clear, move the part, or say where it really stands (--start)"
-        return _Fault(index=0, why="stale start", text=text, touch=touch)
-    fast = np.flatnonzero(path.speed > FASTEST)
-    if len(fast):
-        return _Fault(
-            index=int(fast[0]),
-            why="speed",
-            text=f"{1e3 * path.speed[fast[0]]:.0f} mm/s asked for (limit {1e3 * FASTEST:.0f} mm/s with a torch)",
-        )
-    R = path.X_BT.R
-    if path.roll_free:
-        turn = np.arctan2(np.linalg.norm(np.cross(R[1:, :, 2], R[:-1, :, 2]), axis=1), np.sum(R[1:, :, 2] * R[:-1, :, 2], axis=1))
-    else:
-        turn = (Transform("BT", R[:-1], np.zeros((len(R) - 1, 3))).inverse() @ Transform("BT", R[1:], np.zeros((len(R) - 1, 3)))).R
-        turn = np.arccos(np.clip((np.trace(turn, axis1=1, axis2=2) - 1) / 2, -1.0, 1.0))
-    ds = np.diff(path.s)
-    jumps = np.flatnonzero(turn > np.maximum(JUMP, config.joint_rate * ds))
-    if len(jumps):
-        i = int(jumps[0])
-        limit = np.rad2deg(max(JUMP, config.joint_rate * ds[i]))
-        text = f"the torch turns {np.rad2deg(turn[i]):.1f} deg within {1e3 * ds[i]:.1f} mm (limit {limit:.1f} deg); smooth the path"
-        return _Fault(index=i + 1, why="orientation jump", text=text)
+        return Fault(index=0, why="stale start", text=text, touch=touch)
     return None
+
+
+def _spoilt(base: Trial, path: TorchPath, start: Fault | None, faults: list[Fault], cell: Cell, config: MotionConfig) -> Trial:
+    """A path with faults of its own: the motion ends at the first, and every pose that fails is named, whatever comes before it."""
+    named = {fault.index: fault for fault in [*_refusals(path, cell, config), *faults, *([] if start is None else [start])]}
+    first = min(named)
+    return replace(
+        base,
+        verdicts=_ended(path, list(named.values())),
+        p_worst=path.X_BT.p[first],
+        q_worst=cell.q_start if named[first].why == "stale start" else None,
+    )
+
+
+def _poses(path: TorchPath, kept: Bool[ndarray, "n"]) -> TorchPath:
+    """The path with some of its poses."""
+    return TorchPath(
+        X_BT=Transform("BT", path.X_BT.R[kept], path.X_BT.p[kept]),
+        s=path.s[kept],
+        speed=path.speed[kept],
+        arc_on=path.arc_on[kept],
+        segments=tuple(segment for segment, keep in zip(path.segments, kept, strict=True) if keep),
+        roll_free=path.roll_free,
+    )
+
+
+def _refusals(path: TorchPath, cell: Cell, config: MotionConfig) -> list[Fault]:
+    """The poses that no posture will do for, each taken alone."""
+    moved = np.concatenate([[True], np.diff(path.s) > 1e-9])
+    try:
+        rail = make_rail(_poses(path, moved), config)
+    except MotionError:
+        return []
+    places = rail.s[rail.index >= 0]
+    rungs = make_rungs(rail, cell.arm, config, cell.collision, at=places)
+    kept, out = np.flatnonzero(moved), []
+    for index, refusal in zip(rail.index[rail.index >= 0], rungs.refusals, strict=True):
+        if refusal is not None:
+            text = _said(refusal.why, refusal.text, refusal.options, rail)
+            out.append(Fault(index=int(kept[index]), why=refusal.why, text=text, touch=refusal.touch))
+    return out
 
 
 def _first_refused(rail: Rail, rungs: Rungs, cell: Cell, config: MotionConfig) -> tuple[float, Refusal] | None:
@@ -141,11 +147,11 @@ def _refused(base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, s_first: fl
     for i, k in enumerate(nearest):
         mine = rungs.refusals[int(k)]
         if mine is not None and path.s[i] >= s_first - 1e-9:
-            verdicts[i] = _failing(verdicts[i], _Fault(index=i, why=mine.why, text=mine.text, touch=mine.touch))
+            verdicts[i] = _failing(verdicts[i], Fault(index=i, why=mine.why, text=mine.text, touch=mine.touch))
     lead = "" if rail.start <= s_first <= rail.end else f" on the {'lead-in' if s_first < rail.start else 'lead-out'}"
     index = rail.path_index(s_first)
     text = f"s = {1e3 * s_first:.1f} mm{lead}: {_said(refusal.why, refusal.text, refusal.options, rail)}"
-    verdicts[index] = _failing(verdicts[index], _Fault(index=index, why=refusal.why, text=text, touch=refusal.touch))
+    verdicts[index] = _failing(verdicts[index], Fault(index=index, why=refusal.why, text=text, touch=refusal.touch))
     before = int(np.searchsorted(rungs.s, s_first, side="right")) - 1
     return replace(
         base,
@@ -181,7 +187,7 @@ def _failed(base: Trial, path: TorchPath, error: MotionError, rungs: Rungs, cell
     touch = cell.collision.touch(q_worst) if why == "collision" and q_worst is not None else None
     return replace(
         base,
-        verdicts=_ended(path, _Fault(index=index, why=why, text=str(error), touch=touch)),
+        verdicts=_ended(path, [Fault(index=index, why=why, text=str(error), touch=touch)]),
         s_worst=s,
         q_worst=q_worst,
         p_worst=path.X_BT.p[index],
@@ -206,11 +212,26 @@ def _planned(base: Trial, path: TorchPath, plan: MotionPlan, config: MotionConfi
     if plan.slowest >= config.least_speed:
         return out
     asked = float(path.speed[path.weld].max())
-    text = (
-        f"joint limits allow {100 * plan.slowest:.0f} % of the {1e3 * asked:.0f} mm/s asked for"
-        f" ({config.joint_speed_limit:g} rad/s, {config.joint_acceleration_limit:g} rad/s2)"
-    )
-    index = int(np.abs(path.s - plan.slowest_at).argmin())
+    limits = f"({config.joint_speed_limit:g} rad/s, {config.joint_acceleration_limit:g} rad/s2)"
+    slow = _slow_poses(path, plan, config)
+    slow[int(np.abs(path.s - plan.slowest_at).argmin())] = plan.slowest
     verdicts = list(_all(path))
-    verdicts[index] = _failing(verdicts[index], _Fault(index=index, why="speed", text=text))
-    return replace(out, verdicts=tuple(verdicts), s_worst=plan.slowest_at, p_worst=path.X_BT.p[index])
+    for index, share in slow.items():
+        text = f"joint limits allow {100 * share:.0f} % of the {1e3 * asked:.0f} mm/s asked for {limits}"
+        verdicts[index] = _failing(verdicts[index], Fault(index=index, why="speed", text=text))
+    first = min(slow)
+    return replace(out, verdicts=tuple(verdicts), s_worst=plan.slowest_at if len(slow) == 1 else None, p_worst=path.X_BT.p[first])
+
+
+def _slow_poses(path: TorchPath, plan: MotionPlan, config: MotionConfig) -> dict[int, float]:
+    """Share of the asked speed at every pose where it is below the least, ramps at the ends of the weld left out."""
+    trajectory = plan.trajectory
+    welding = np.array([segment == Segment.WELD for segment in trajectory.segments])
+    s, speed = trajectory.s[welding], np.gradient(trajectory.s, trajectory.t)[welding]
+    ends = np.array([path.s[path.weld][0], path.s[path.weld][-1], *plan.cuts])
+    out: dict[int, float] = {}
+    for i in np.flatnonzero(path.arc_on):
+        share = float(np.interp(path.s[i], s, speed) / path.speed[i])
+        if share < config.least_speed and np.abs(ends - path.s[i]).min() > plan.ramp + RAMP_MARGIN:
+            out[int(i)] = share
+    return out

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell
+from weldsim.dryrun.path_faults import FASTEST
 from weldsim.dryrun.program import Motion, Program
-from weldsim.dryrun.try_path import FASTEST
 from weldsim.dryrun.verdict import Trial, Verdict, Why
 from weldsim.frames import Transform, rotation_vector_from_matrix, slerp
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, SPEED_LIMIT, inverse, torch_pose
@@ -36,61 +36,81 @@ class _Way:
 
 
 def try_script(program: Program, cell: Cell) -> Trial:
-    """A verdict for every motion of the program, the arm starting where the cell has it; what follows a failure is not reached."""
-    q = np.array(cell.q_start, float)
+    """A verdict for every motion of the program, the arm starting where the cell has it.
+
+    What follows a failure is not reached; it is checked all the same, as if the arm had come to the target that failed, so that
+    every failure is told. Where nobody can say how the arm would stand, that goes on from the next target in joint angles.
+    """
+    q: Float[ndarray, "6"] | None = np.array(cell.q_start, float)
     verdicts: list[Verdict] = []
     t, rows, arc, clock = [np.zeros(1)], [q[None]], [np.zeros(1, bool)], 0.0
-    q_worst, p_worst, length = None, None, 0.0
-    over = np.abs(q) > JOINT_LIMIT
-    start = f"where the arm stands {touch}" if (touch := cell.collision(q)) is not None else ""
-    if over.any():
-        start = f"the arm is said to stand with {JOINT_NAMES[int(np.flatnonzero(over)[0])]} beyond +-360 deg"
+    q_worst, p_worst, length, gone, failed = None, None, 0.0, 0.0, False
+    start = _bad_start(q, cell)
     for index, motion in enumerate(program.motions):
-        verdict = Verdict(label=f"line {motion.line} {motion.command}", index=index, s=length)
-        if verdicts and not verdicts[-1].ok:
-            verdicts.append(replace(verdict, why="not reached", text="the program has failed before"))
-            continue
+        verdict = Verdict(label=f"line {motion.line} {motion.command}", index=index, s=gone)
+        late = replace(verdict, why="not reached", text="the program has failed before")
         if index == 0 and start:
             verdicts.append(replace(verdict, why="stale start", text=f"{start}; say where it really stands (--start)"))
-            q_worst, p_worst = q, torch_pose(q).p
+            q_worst, p_worst, failed, q = q, torch_pose(q).p, True, motion.q
+            continue
+        if q is None:
+            verdicts.append(late)
+            q = motion.q
             continue
         way = _way(motion, q, index == 0 or program.motions[index - 1].command != "servoj")
-        why, text, at, first, second, depth = way.why, way.text, way.at, "", "", 0.0
-        found = first_touch(way.q, cell.collision) if len(way.q) > 1 else None
-        if found is not None and (why == "ok" or found[0] <= at):
-            at = min(int(np.ceil(found[0])), len(way.q) - 1)
-            q_hit = way.q[at - 1] + (found[0] - at + 1) * (way.q[at] - way.q[at - 1]) if at else way.q[0]
-            hit = cell.collision.touch(q_hit)
-            why, text = "collision", f"{found[1]}, {100 * found[0] / (len(way.q) - 1):.0f} % of the way"
-            if hit is not None:
-                first, second, depth = hit.first, hit.second, hit.depth
-            q_worst = q_hit
-        verdicts.append(replace(verdict, why=why, text=text, first=first, second=second, depth=depth))
+        checked, q_at = _checked(verdict, way, cell)
+        verdicts.append(late if failed and checked.ok else checked)
         tips = torch_pose(way.q).p
-        length += float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())
-        if why != "ok":
-            q_worst = way.q[min(at, len(way.q) - 1)] if q_worst is None else q_worst
-            p_worst = torch_pose(q_worst).p if motion.X_BT is None or why == "collision" else motion.X_BT.p
-        else:
+        gone += float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())
+        length = length if failed else gone
+        if not checked.ok:
+            if not failed:
+                q_worst = q_at
+                p_worst = torch_pose(q_at).p if motion.X_BT is None or checked.why == "collision" else motion.X_BT.p
+            failed = True
+            q = motion.q if motion.q is not None else _near(motion.X_BT, q)
+            continue
+        if not failed:
             t.append(clock + np.linspace(0, way.duration, len(way.q))[1:])
             rows.append(way.q[1:])
             arc.append(np.full(len(way.q) - 1, motion.arc))
             clock += way.duration
-            q = way.q[-1]
+        q = way.q[-1]
     all_q = np.concatenate(rows)
-    passed = all(verdict.ok for verdict in verdicts)
     return Trial(
         name=program.source,
         verdicts=tuple(verdicts),
         t=np.concatenate(t),
         q=all_q,
         arc_on=np.concatenate(arc),
-        cycle=clock + program.pauses if passed else 0.0,
+        cycle=0.0 if failed else clock + program.pauses,
         q_worst=q_worst,
         p_worst=p_worst,
         points_B=torch_pose(all_q).p if len(all_q) > 1 else np.zeros((0, 3)),
         length=length,
     )
+
+
+def _bad_start(q: Float[ndarray, "6"], cell: Cell) -> str:
+    """What is wrong with where the arm stands, or ""."""
+    over = np.abs(q) > JOINT_LIMIT
+    if over.any():
+        return f"the arm is said to stand with {JOINT_NAMES[int(np.flatnonzero(over)[0])]} beyond +-360 deg"
+    return f"where the arm stands {touch}" if (touch := cell.collision(q)) is not None else ""
+
+
+def _checked(verdict: Verdict, way: _Way, cell: Cell) -> tuple[Verdict, Float[ndarray, "6"]]:
+    """The verdict of a motion, and how the arm stands where it fails, or in the end [rad]."""
+    at = min(way.at, len(way.q) - 1)
+    found = first_touch(way.q, cell.collision) if len(way.q) > 1 else None
+    if found is None or (way.why != "ok" and found[0] > way.at):
+        return replace(verdict, why=way.why, text=way.text), way.q[at]
+    at = min(int(np.ceil(found[0])), len(way.q) - 1)
+    q_hit = way.q[at - 1] + (found[0] - at + 1) * (way.q[at] - way.q[at - 1]) if at else way.q[0]
+    hit = cell.collision.touch(q_hit)
+    first, second, depth = ("", "", 0.0) if hit is None else (hit.first, hit.second, hit.depth)
+    text = f"{found[1]}, {100 * found[0] / (len(way.q) - 1):.0f} % of the way"
+    return replace(verdict, why="collision", text=text, first=first, second=second, depth=depth), q_hit
 
 
 def _way(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:

@@ -16,6 +16,7 @@ Why = Literal[
     "singular",
     "collision",
     "orientation jump",
+    "turns back",
     "speed",
     "joint jump",
     "stale start",

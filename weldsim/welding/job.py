@@ -11,7 +11,7 @@ from weldsim.clock import Clock
 from weldsim.config import CellConfig, digest, limits_for
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.program import Program
-from weldsim.dryrun.try_path import try_path
+from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.dryrun.verdict import Trial
 from weldsim.errors import ExecutionError, InputError, Interrupted
 from weldsim.execution.contract import Clause, contract, own_arm, require_kept
@@ -133,7 +133,7 @@ def weld(
         with clock.stage("dry run"):
             q_start = np.array(gate.state().q)
             here = replace(cell.fitted(gate.arm), q_start=q_start)
-            trial = try_path(path, program.names[job.seam], here, replace(config.motion, period=gate.period))
+            _, trial = try_waypoints(path, program.names[job.seam], here, replace(config.motion, period=gate.period))
         if trial.passed and trial.trajectory is not None:
             trajectory = at_period(slowed(trial.trajectory, job.speed_scale), gate.period)
             with clock.stage("execution"):

@@ -1,0 +1,148 @@
+"""How far waypoints scatter about a smooth curve, and a curve that follows them as closely as that scatter allows.
+
+Waypoints of other programs are often measured, or planned from measured points. A motion through each of them to a hundredth of a
+millimetre needs joint accelerations that are the scatter's alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from scipy.interpolate import BSpline, make_smoothing_spline
+
+from weldsim.curves import arc_length
+from weldsim.frames import Transform
+from weldsim.records import TorchPath
+
+FEWEST = 7  # waypoints of which scatter can be told
+SAME = 1e-6  # [m] waypoints nearer to each other are one place
+STEP = 0.001  # [m] between the poses of a refitted path
+LEAST = (1e-6, 1e-5)  # [m], [rad] scatter that counts as none
+MEDIAN = 1.5382  # of the length of a vector of three independent standard normal components
+STRENGTHS = (1e-14, 1e2)  # of smoothing, over arc length in units of the path's own: none and almost a straight line
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scatter:
+    """Standard deviation of the waypoints about a smooth curve, each axis alone: position [m], rotation [rad]."""
+
+    position: float
+    rotation: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Refit:
+    """A smooth curve near the waypoints.
+
+    Attributes:
+        path: poses STEP apart.  nearest: (n,) index of the one on it for each waypoint.
+        position_off, rotation_off: greatest distance [m] and angle [rad] of a waypoint from the curve.
+        chord_off: greatest distance of the curve from the straight lines between the waypoints [m].
+    """
+
+    path: TorchPath
+    nearest: ndarray
+    position_off: float
+    rotation_off: float
+    chord_off: float
+
+
+def scatter_of(path: TorchPath) -> Scatter:
+    """The waypoints' scatter: how far each is from the cubic through the two before and the two after it.
+
+    The median over all waypoints: corners and jumps, which are few, have no say.
+    """
+    places = _places(path)
+    if len(places) < FEWEST:
+        return Scatter(position=0.0, rotation=0.0)
+    p, q = path.X_BT.p[places], _continuous(path.X_BT.quaternion[places])
+    weights = _cubic_weights(arc_length(p))
+    scale = MEDIAN * np.sqrt(1.0 + np.sum(weights**2, axis=1))
+    out = []
+    for values in (p, 2.0 * q):  # half the turn stands in a quaternion
+        around = np.stack([values[i : len(values) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
+        off = np.linalg.norm(values[2:-2] - np.einsum("ij,ijk->ik", weights, around), axis=1)
+        out.append(float(np.median(off / scale)))
+    return Scatter(position=out[0], rotation=out[1])
+
+
+def refit(path: TorchPath, scatter: Scatter, share: float = 1.0) -> Refit:
+    """The smoothest curve whose root mean square distance from the waypoints is `share` of their scatter."""
+    places = _places(path)
+    p, q = path.X_BT.p[places], _continuous(path.X_BT.quaternion[places])
+    s = arc_length(p)
+    u = s / s[-1]
+    position = _smoothed(u, p, share * max(scatter.position, LEAST[0]) * np.sqrt(3.0))
+    rotation = _smoothed(u, q, share * max(scatter.rotation, LEAST[1]) * np.sqrt(3.0) / 2.0)
+    dense = np.linspace(0.0, 1.0, max(len(places), int(np.ceil(s[-1] / STEP)) + 1))
+    R = Transform.from_quaternion("BT", _unit(rotation(dense)), position(dense))
+    at_waypoints = Transform.from_quaternion("BT", _unit(rotation(u)), position(u))
+    index = np.searchsorted(places, np.arange(len(path.X_BT)), side="right") - 1
+    nearest = np.abs(dense[:, None] - u[None, :]).argmin(axis=0)
+    chord = np.stack([np.interp(dense, u, column) for column in p.T], axis=1)
+    before = places[np.clip(np.searchsorted(u, dense, side="right") - 1, 0, len(places) - 2)]
+    turn = 2.0 * np.arccos(np.clip(np.abs(np.sum(at_waypoints.quaternion * q, axis=1)), 0.0, 1.0))
+    fitted = TorchPath(
+        X_BT=R,
+        s=arc_length(R.p),
+        speed=path.speed[before],
+        arc_on=path.arc_on[before],
+        segments=tuple(path.segments[i] for i in before),
+        roll_free=path.roll_free,
+    )
+    return Refit(
+        path=fitted,
+        nearest=nearest[index],
+        position_off=float(np.linalg.norm(at_waypoints.p - p, axis=1).max()),
+        rotation_off=float(turn.max()),
+        chord_off=float(np.linalg.norm(R.p - chord, axis=1).max()),
+    )
+
+
+def _places(path: TorchPath) -> ndarray:
+    """Indices of the waypoints, without those in the same place as the one before."""
+    kept = [0]
+    for i in range(1, len(path.X_BT)):
+        if np.linalg.norm(path.X_BT.p[i] - path.X_BT.p[kept[-1]]) > SAME:
+            kept.append(i)
+    return np.array(kept)
+
+
+def _continuous(q: Float[ndarray, "n 4"]) -> Float[ndarray, "n 4"]:
+    """The quaternions, neighbours on the same side."""
+    flips = np.cumprod(np.concatenate([[1.0], np.where(np.sum(q[1:] * q[:-1], axis=1) < 0, -1.0, 1.0)]))
+    return q * flips[:, None]
+
+
+def _unit(q: Float[ndarray, "n 4"]) -> Float[ndarray, "n 4"]:
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def _cubic_weights(s: Float[ndarray, "n"]) -> Float[ndarray, "m 4"]:
+    """Lagrange's weights of the two places before and the two after each, at that place."""
+    around = np.stack([s[i : len(s) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
+    at = s[2:-2, None]
+    out = np.ones((len(at), 4))
+    for k in range(4):
+        for j in range(4):
+            if j != k:
+                out[:, k] *= (at[:, 0] - around[:, j]) / (around[:, k] - around[:, j])
+    return out
+
+
+def _smoothed(u: Float[ndarray, "n"], values: Float[ndarray, "n d"], distance: float) -> BSpline:
+    """The spline with the strongest smoothing whose root mean square distance from the values is `distance` at most."""
+    best = make_smoothing_spline(u, values, lam=0.0)
+    if distance <= LEAST[0]:
+        return best
+    low, high = np.log(STRENGTHS[0]), np.log(STRENGTHS[1])
+    for _ in range(40):
+        middle = (low + high) / 2
+        spline = make_smoothing_spline(u, values, lam=float(np.exp(middle)))
+        off = np.sqrt(np.mean(np.sum((spline(u) - values) ** 2, axis=1)))
+        if off <= distance:
+            best, low = spline, middle
+        else:
+            high = middle
+    return best

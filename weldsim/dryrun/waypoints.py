@@ -1,0 +1,121 @@
+"""A path of waypoints tried: through each of them, or along a smooth curve as near to them as their own scatter allows."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from weldsim.dryrun.cell import Cell
+from weldsim.dryrun.path_faults import FASTEST
+from weldsim.dryrun.scatter import Refit, Scatter, refit, scatter_of
+from weldsim.dryrun.try_path import try_path
+from weldsim.dryrun.verdict import Trial, Verdict
+from weldsim.motion.config import MotionConfig
+from weldsim.records import TorchPath
+
+MENDED = ("speed", "orientation jump", "joint jump")  # failures that a smoother motion may not have
+CLOSER, SMOOTHER = (1.0, 0.5, 0.25, 0.0), (1.5, 2.0)  # shares of the scatter that a curve may leave the waypoints by, all in all
+MOST = 6.0  # standard deviations of the scatter that any waypoint may be off the curve
+CHORD = 0.0005  # [m] more that the curve may be off the straight lines between the waypoints
+TOLD = (2e-5, np.deg2rad(0.05))  # [m], [rad] scatter worth being told
+
+
+def try_waypoints(path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> tuple[TorchPath, Trial]:
+    """The path that the motion follows, and a verdict for every waypoint of the one that was asked for.
+
+    A path that fails where it is followed straight from waypoint to waypoint is tried again along a smooth curve: only what
+    no such curve within tolerance mends is a failure.
+    """
+    trial = try_path(path, name, cell, config)
+    if not _worth_refitting(path, trial):
+        return path, trial
+    scatter = scatter_of(path)
+    tried = [(fitted, _tried(fitted, path, name, cell, config)) for fitted in _fits(path, scatter, config)[:1]]
+    if not tried:
+        return path, trial
+    if not tried[0][1].passed:
+        tried += [
+            (fitted, _tried(fitted, path, name, cell, config))
+            for fitted in (refit(path, scatter, share) for share in SMOOTHER)
+            if _within(fitted, scatter)
+        ]
+    better = next(((fitted, one) for fitted, one in tried if one.passed), None)
+    if better is None:
+        return path, _truer(trial, tried[0][1], _scattered(scatter))
+    fitted, best = better
+    notes = (*_told(path, fitted, scatter, trial), *best.notes)
+    return fitted.path, replace(best, notes=notes)
+
+
+def _worth_refitting(path: TorchPath, trial: Trial) -> bool:
+    failure = trial.failure
+    return failure is not None and failure.why in MENDED and not trial.lead and path.speed.max() <= FASTEST
+
+
+def _fits(path: TorchPath, scatter: Scatter, config: MotionConfig) -> list[Refit]:
+    """Curves within tolerance, the smoothest first; none where they would be the straight lines between the waypoints."""
+    out = [fitted for fitted in (refit(path, scatter, share) for share in CLOSER) if _within(fitted, scatter)]
+    return out if out and out[0].chord_off + out[0].rotation_off > config.spline_tolerance else []
+
+
+def _within(fitted: Refit, scatter: Scatter) -> bool:
+    """Whether a curve is as near to the waypoints as their scatter allows, and to the lines between them."""
+    near = MOST * scatter.position + TOLD[0]
+    return (
+        fitted.position_off <= near
+        and fitted.rotation_off <= MOST * scatter.rotation + TOLD[1]
+        and fitted.chord_off <= near + CHORD
+    )
+
+
+def _tried(fitted: Refit, path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Trial:
+    """The curve tried, with a verdict for each waypoint: that of the first of its own poses that fails."""
+    trial = try_path(fitted.path, name, cell, config)
+    owner = np.abs(fitted.path.s[:, None] - fitted.path.s[fitted.nearest][None, :]).argmin(axis=1)
+    worst: dict[int, Verdict] = {}
+    for verdict in trial.verdicts:
+        mine = int(owner[verdict.index])
+        if mine not in worst or (worst[mine].ok and not verdict.ok) or worst[mine].why == "not reached":
+            worst[mine] = verdict
+    verdicts = []
+    for index, s in enumerate(path.s):
+        found = worst.get(index, worst[max(k for k in worst if k <= index)])
+        text = re.sub(r"\bpose (\d+)", lambda said: f"pose {owner[int(said[1])]}", found.text)
+        verdicts.append(replace(found, label=f"pose {index}", index=index, s=float(s), text=text))
+    return replace(trial, verdicts=tuple(verdicts))
+
+
+def _truer(trial: Trial, fitted: Trial, said: str) -> Trial:
+    """Of two trials that fail the one whose reason does not come from the scatter: the smooth one's, unless both fail alike."""
+    a, b = trial.failure, fitted.failure
+    same = a is None or b is None or (a.why == b.why and abs(a.index - b.index) <= 1)
+    kept = trial if same else fitted
+    return replace(kept, notes=(*kept.notes, f"{said}no smooth curve within that passes either")) if said else kept
+
+
+def _scattered(scatter: Scatter) -> str:
+    """The scatter in words, or "" where there is none worth being told."""
+    if scatter.position < TOLD[0] and scatter.rotation < TOLD[1]:
+        return ""
+    return (
+        f"the waypoints scatter by {1e3 * scatter.position:.2f} mm and {np.rad2deg(scatter.rotation):.2f} deg (standard"
+        " deviation of each axis about a smooth curve); "
+    )
+
+
+def _told(path: TorchPath, fitted: Refit, scatter: Scatter, exact: Trial) -> tuple[str, ...]:
+    said = _scattered(scatter)
+    if said:
+        text = (
+            f"{said}the motion follows a curve that leaves them by up to {1e3 * fitted.position_off:.2f} mm and"
+            f" {np.rad2deg(fitted.rotation_off):.1f} deg"
+        )
+    else:
+        furthest = float(np.linalg.norm(np.diff(path.X_BT.p, axis=0), axis=1).max())
+        text = (
+            f"the waypoints are up to {1e3 * furthest:.1f} mm apart: the motion follows a smooth curve through them, up to"
+            f" {1e3 * fitted.chord_off:.2f} mm off the straight lines between them"
+        )
+    failure = exact.failure
+    why = "" if failure is None else f"straight from waypoint to waypoint it would fail at {failure.label}: {failure.text}"
+    return (text, why)
