@@ -19,13 +19,16 @@ FEWEST = 7  # waypoints of which scatter can be told
 SAME = 1e-6  # [m] waypoints nearer to each other are one place
 STEP = 0.001  # [m] between the poses of a refitted path
 LEAST = (1e-6, 1e-5)  # [m], [rad] scatter that counts as none
-MEDIAN = 1.5382  # of the length of a vector of three independent standard normal components
+MEDIANS = (1.1774, 1.5382)  # of the length of a vector of two and of three independent standard normal components
 STRENGTHS = (1e-14, 1e2)  # of smoothing, over arc length in units of the path's own: none and almost a straight line
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """Standard deviation of the waypoints about a smooth curve, each axis alone: position [m], rotation [rad]."""
+    """Standard deviation of the waypoints about a smooth curve, each axis alone: position across travel [m], rotation [rad].
+
+    Along travel nobody can tell: where a waypoint ought to be on its curve is not known.
+    """
 
     position: float
     rotation: float
@@ -58,12 +61,12 @@ def scatter_of(path: TorchPath) -> Scatter:
         return Scatter(position=0.0, rotation=0.0)
     p, q = path.X_BT.p[places], _continuous(path.X_BT.quaternion[places])
     weights = _cubic_weights(arc_length(p))
-    scale = MEDIAN * np.sqrt(1.0 + np.sum(weights**2, axis=1))
+    scale = np.sqrt(1.0 + np.sum(weights**2, axis=1))
     out = []
-    for values in (p, 2.0 * q):  # half the turn stands in a quaternion
+    for values, median in zip((p, 2.0 * q), MEDIANS, strict=True):  # half the turn stands in a quaternion
         around = np.stack([values[i : len(values) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
         off = np.linalg.norm(values[2:-2] - np.einsum("ij,ijk->ik", weights, around), axis=1)
-        out.append(float(np.median(off / scale)))
+        out.append(float(np.median(off / scale)) / median)
     return Scatter(position=out[0], rotation=out[1])
 
 
@@ -73,7 +76,7 @@ def refit(path: TorchPath, scatter: Scatter, share: float = 1.0) -> Refit:
     p, q = path.X_BT.p[places], _continuous(path.X_BT.quaternion[places])
     s = arc_length(p)
     u = s / s[-1]
-    position = _smoothed(u, p, share * max(scatter.position, LEAST[0]) * np.sqrt(3.0))
+    position = _smoothed(u, p, share * max(scatter.position, LEAST[0]) * np.sqrt(2.0))
     rotation = _smoothed(u, q, share * max(scatter.rotation, LEAST[1]) * np.sqrt(3.0) / 2.0)
     dense = np.linspace(0.0, 1.0, max(len(places), int(np.ceil(s[-1] / STEP)) + 1))
     R = Transform.from_quaternion("BT", _unit(rotation(dense)), position(dense))

@@ -15,7 +15,7 @@ from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.motion.rail import Rail, make_rail
-from weldsim.motion.rungs import Refusal, Rungs, make_rungs
+from weldsim.motion.rungs import Refusal, Rungs, make_rungs, places
 from weldsim.records import Segment, TorchPath
 
 FINE = 0.001  # [m] to which the first place that fails is found
@@ -116,10 +116,13 @@ def _refusals(path: TorchPath, cell: Cell, config: MotionConfig) -> list[Fault]:
         rail = make_rail(_poses(path, moved), config)
     except MotionError:
         return []
-    places = rail.s[rail.index >= 0]
-    rungs = make_rungs(rail, cell.arm, config, cell.collision, at=places)
+    mine = rail.index >= 0
+    apart = places(rail)  # of a dense path not every pose is looked at
+    rungs = make_rungs(rail, cell.arm, config, cell.collision, at=rail.s[mine] if mine.sum() < len(apart) else apart)
+    nearest = np.abs(rail.s[mine][:, None] - rungs.s[None, :]).argmin(axis=1)
     kept, out = np.flatnonzero(moved), []
-    for index, refusal in zip(rail.index[rail.index >= 0], rungs.refusals, strict=True):
+    for index, k in zip(rail.index[mine], nearest, strict=True):
+        refusal = rungs.refusals[int(k)]
         if refusal is not None:
             text = _said(refusal.why, refusal.text, refusal.options, rail)
             out.append(Fault(index=int(kept[index]), why=refusal.why, text=text, touch=refusal.touch))

@@ -51,7 +51,7 @@ def try_script(program: Program, cell: Cell) -> Trial:
         late = replace(verdict, why="not reached", text="the program has failed before")
         if index == 0 and start:
             verdicts.append(replace(verdict, why="stale start", text=f"{start}; say where it really stands (--start)"))
-            q_worst, p_worst, failed, q = q, torch_pose(q).p, True, motion.q
+            q_worst, p_worst, failed, q = cell.q_start, torch_pose(cell.q_start).p, True, motion.q
             continue
         if q is None:
             verdicts.append(late)

@@ -49,7 +49,7 @@ def try_waypoints(path: TorchPath, name: str, cell: Cell, config: MotionConfig) 
 
 def _worth_refitting(path: TorchPath, trial: Trial) -> bool:
     failure = trial.failure
-    return failure is not None and failure.why in MENDED and not trial.lead and path.speed.max() <= FASTEST
+    return failure is not None and failure.why in MENDED and not trial.lead and float(path.speed.max()) <= FASTEST
 
 
 def _fits(path: TorchPath, scatter: Scatter, config: MotionConfig) -> list[Refit]:
@@ -61,7 +61,7 @@ def _fits(path: TorchPath, scatter: Scatter, config: MotionConfig) -> list[Refit
 def _within(fitted: Refit, scatter: Scatter) -> bool:
     """Whether a curve is as near to the waypoints as their scatter allows, and to the lines between them."""
     near = MOST * scatter.position + TOLD[0]
-    return (
+    return bool(
         fitted.position_off <= near
         and fitted.rotation_off <= MOST * scatter.rotation + TOLD[1]
         and fitted.chord_off <= near + CHORD

@@ -11,8 +11,8 @@ from weldsim.clock import Clock
 from weldsim.config import CellConfig, digest, limits_for
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.program import Program
-from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.dryrun.verdict import Trial
+from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.errors import ExecutionError, InputError, Interrupted
 from weldsim.execution.contract import Clause, contract, own_arm, require_kept
 from weldsim.execution.gate import SafetyGate

@@ -1,0 +1,189 @@
+"""Waypoints of other programs: noisy or coarse ones are followed as they allow, and all that is wrong with a path is told."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.torch_paths import START, torch_path
+from weldsim.cli import main
+from weldsim.curves import arc_length, project
+from weldsim.dryrun.cell import Cell, empty_cell
+from weldsim.dryrun.path_faults import turns_back
+from weldsim.dryrun.read import read_program
+from weldsim.dryrun.run import dry_run
+from weldsim.dryrun.scatter import refit, scatter_of
+from weldsim.dryrun.verdict import Trial
+from weldsim.dryrun.waypoints import try_waypoints
+from weldsim.frames import Transform
+from weldsim.motion.config import MotionConfig
+from weldsim.records import TorchPath
+
+CONFIG = MotionConfig()
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@pytest.fixture(scope="module")
+def empty() -> Cell:
+    return empty_cell(START)
+
+
+def waypoints(n: int = 40, length: float = 0.3, bend: float = 0.05, seed: int = 0, position=0.0, rotation=0.0) -> TorchPath:
+    """A gentle arc over the table, its waypoints scattered by standard deviations [m], [rad] of each axis."""
+    rng = np.random.default_rng(seed)
+    u = np.linspace(-0.5, 0.5, n)
+    points = np.stack([u * length, -0.45 + bend * 4 * u**2, np.full(n, 0.1)], axis=1)
+    exact = torch_path(points, DOWN)
+    turns = Transform.from_rotation_vector("TT", rotation * rng.normal(size=(n, 3)), np.zeros((n, 3)))
+    p = points + position * rng.normal(size=(n, 3))
+    return replace(exact, X_BT=Transform("BT", exact.X_BT.R @ turns.R, p), s=arc_length(p), roll_free=False)
+
+
+def kinds(trial: Trial) -> dict[int, str]:
+    return {verdict.index: verdict.why for verdict in trial.verdicts if verdict.why not in ("ok", "not reached")}
+
+
+@pytest.mark.parametrize(("position", "rotation"), [(1e-4, 2e-3), (5e-4, 1e-2), (1e-4, 2e-2)])
+def test_scatter_is_told_as_it_is(position, rotation) -> None:
+    found = [scatter_of(waypoints(60, seed=seed, position=position, rotation=rotation)) for seed in range(20)]
+    assert np.median([one.position for one in found]) == pytest.approx(position, rel=0.15)
+    assert np.median([one.rotation for one in found]) == pytest.approx(rotation, rel=0.15)
+    assert all(0.6 * position < one.position < 1.6 * position for one in found)
+
+
+def test_exact_waypoints_have_no_scatter_and_a_jump_is_none() -> None:
+    path = waypoints()
+    assert scatter_of(path).position < 2e-5
+    p = np.array(path.X_BT.p)
+    p[20:, 1] += 0.003
+    assert scatter_of(replace(path, X_BT=Transform("BT", path.X_BT.R, p), s=arc_length(p))).position < 2e-5
+
+
+def test_a_curve_leaves_the_waypoints_by_their_scatter_and_comes_nearer_to_the_truth() -> None:
+    for seed in range(5):
+        path, truth = waypoints(60, seed=seed, position=5e-4, rotation=1e-2), waypoints(600).X_BT.p
+        fitted = refit(path, scatter_of(path))
+        at = fitted.path.X_BT.p[fitted.nearest]
+        off = at - path.X_BT.p
+        assert np.sqrt(np.mean(off[:, 1:] ** 2)) == pytest.approx(5e-4, rel=0.35)
+        before, after = (np.sqrt(np.mean(project(p, truth)[0] ** 2)) for p in (path.X_BT.p, fitted.path.X_BT.p))
+        assert after < 0.6 * before
+        assert fitted.position_off >= np.linalg.norm(off, axis=1).max() - 6e-4
+
+
+def test_noisy_waypoints_that_the_arm_can_weld_pass_and_the_scatter_is_told(empty: Cell) -> None:
+    path = waypoints(40, seed=3, position=1.5e-4, rotation=1.5e-2)
+    followed, trial = try_waypoints(path, "noisy", empty, CONFIG)
+    assert trial.passed, trial.failure
+    assert [verdict.index for verdict in trial.verdicts] == list(range(40))
+    told = re.search(r"scatter by ([\d.]+) mm and ([\d.]+) deg .* leaves them by up to ([\d.]+) mm", trial.notes[0])
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.15, rel=0.5)
+    assert float(told[2]) == pytest.approx(0.86, rel=0.5)
+    assert "would fail at pose" in trial.notes[1]
+    nearest = np.linalg.norm(followed.X_BT.p[:, None] - path.X_BT.p[None], axis=2).min(axis=0)
+    assert nearest.max() < 1e-3 * float(told[3]) + 1e-3
+    assert trial.slowest > 0.99
+
+
+def test_coarse_waypoints_are_joined_by_a_curve(empty: Cell) -> None:
+    angle = np.linspace(0, 2.2, 16)
+    points = np.stack([0.04 * np.sin(angle), -0.45 + 0.04 * np.cos(angle), np.full(16, 0.1)], axis=1)
+    path = torch_path(points, DOWN, speed=0.05)
+    _, trial = try_waypoints(path, "coarse", empty, CONFIG)
+    assert trial.passed, trial.failure
+    if trial.notes and "apart" in trial.notes[0]:
+        off = float(re.findall(r"up to ([\d.]+) mm off", trial.notes[0])[0])
+        assert off == pytest.approx(1e3 * 0.04 * (1 - np.cos(angle[1] / 2)), rel=0.3)
+
+
+def test_what_no_curve_within_the_scatter_mends_is_told(empty: Cell) -> None:
+    path = waypoints(40, seed=1, position=1e-4, rotation=3e-3)
+    R = np.array(path.X_BT.R)
+    R[25:] = R[25:] @ Transform.from_rotation_vector("TT", np.array([0, 0, np.deg2rad(60)]), np.zeros(3)).R
+    jumped = replace(path, X_BT=Transform("BT", R, path.X_BT.p))
+    _, trial = try_waypoints(jumped, "jump", empty, CONFIG)
+    assert kinds(trial) == {25: "orientation jump"}
+    assert any("scatter by" in note for note in trial.notes)
+
+
+def test_every_jump_is_told_and_every_pose_out_of_reach_between_them(empty: Cell) -> None:
+    path = waypoints(120, length=0.24, bend=0.0)
+    R, p = np.array(path.X_BT.R), np.array(path.X_BT.p)
+    lean = Transform.from_rotation_vector("TT", np.array([np.deg2rad(20), 0, 0]), np.zeros(3)).R
+    R[20:] = R[20:] @ lean
+    R[90:] = R[90:] @ lean.T
+    p[30:75, 1] -= 1.0 * np.sin(np.linspace(0, np.pi, 45)) ** 0.5
+    _, trial = try_waypoints(replace(path, X_BT=Transform("BT", R, p), s=arc_length(p)), "jumps", empty, CONFIG)
+    found = kinds(trial)
+    assert found[20] == "orientation jump"
+    assert found[90] == "orientation jump"
+    assert sum(why in ("unreachable", "collision", "singular") for why in found.values()) > 20
+    assert all(verdict.why != "ok" for verdict in trial.verdicts[21:])
+
+
+def shuffled(path: TorchPath, order: list[int]) -> TorchPath:
+    p = path.X_BT.p[order]
+    return replace(path, X_BT=Transform("BT", path.X_BT.R[order], p), s=arc_length(p))
+
+
+@pytest.mark.parametrize("scatter", [0.0, 1e-4])
+def test_travel_that_turns_back_is_called_that_each_time(empty: Cell, scatter) -> None:
+    path = waypoints(30, position=scatter, rotation=scatter)
+    order = [*range(8), 10, 9, 8, *range(11, 20), 22, 21, 20, *range(23, 30)]
+    result = try_waypoints(shuffled(path, order), "back", empty, CONFIG)[1]
+    assert kinds(result) == dict.fromkeys((8, 10, 20, 22), "turns back")
+    assert result.failure is not None
+    assert "put the waypoints in the order of travel" in result.failure.text
+    # The advice, followed.
+    assert not turns_back(path)
+    assert try_waypoints(shuffled(path, list(range(30))), "in order", empty, CONFIG)[1].passed
+
+
+@pytest.mark.parametrize("angle", [60, 120, 160])
+def test_a_corner_and_a_weave_do_not_turn_back(angle) -> None:
+    turn = np.deg2rad(angle)
+    corner = np.array([[0.0, 0, 0], [0.05, 0, 0], [0.05 + 0.05 * np.cos(turn), 0.05 * np.sin(turn), 0]])
+    u = np.linspace(0, 1, 61)
+    weave = np.stack([0.03 * u, 0.003 * (np.arange(61) % 2), 0 * u], axis=1)
+    for points in (corner, weave):
+        assert not turns_back(torch_path(points + np.array([0, -0.45, 0.1]), DOWN))
+
+
+def test_every_failing_motion_of_a_program_is_told(empty: Cell, tmp_path) -> None:
+    file = tmp_path / "job.script"
+    home = "[-1.57, -1.3, -1.9, -1.5, 1.57, 0]"
+    lines = [f"movej({home})", "movej([-1.57, 0.3, 0, -1.5, 1.57, 0])", f"movej({home})", f"movej({home}, v=1)"]
+    lines += ["movel(p[0.0, -1.5, 0.3, 3.1, 0, 0])", "movel(p[0.0, -0.45, 0.3, 3.1, 0, 0])", f"movej({home})"]
+    lines += ["movej([-1.57, -1.3, -1.9, -1.5, 1.57, 6.5])", f"movej({home})"]
+    file.write_text("\n".join(lines))
+    trial = dry_run(read_program(file), empty, fix=False).trials[0]
+    assert kinds(trial) == {1: "collision", 2: "collision", 4: "unreachable", 7: "joint limit", 8: "joint limit"} or kinds(
+        trial
+    ) == {1: "collision", 2: "collision", 4: "unreachable", 7: "joint limit"}
+    assert trial.verdicts[3].why == "not reached"
+    assert trial.cycle == 0.0
+
+
+def test_paths_that_others_planned(real_data, empty: Cell) -> None:
+    """One is weldable, its waypoints noisy; one has its waypoints in no order."""
+    folder = real_data / "welding_robot_paths"
+    good = dry_run(read_program(folder / "straight.csv"), empty_cell(), CONFIG, fix=False).trials[0]
+    assert good.passed
+    assert good.slowest > 0.99
+    assert "scatter by 0.13 mm" in good.notes[0]
+    bad = dry_run(read_program(folder / "reversal.csv"), empty_cell(), CONFIG, fix=False).trials[0]
+    assert set(kinds(bad).values()) == {"turns back"}
+
+
+def test_the_table_names_every_failure_once(tmp_path, capsys) -> None:
+    path = waypoints(30)
+    order = [*range(8), 10, 9, 8, *range(11, 20), 22, 21, 20, *range(23, 30)]
+    X = shuffled(path, order).X_BT
+    file = tmp_path / "back.csv"
+    np.savetxt(file, np.column_stack([X.p, X.rotation_vector]), delimiter=",")
+    assert main(["dry-run", str(file), "--tool", "torch", "--no-fix"]) == 1
+    out = capsys.readouterr().out
+    assert out.count("travel turns back by") == 4
+    assert out.count("not reached") == 1
