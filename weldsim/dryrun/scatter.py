@@ -19,7 +19,8 @@ FEWEST = 7  # waypoints of which scatter can be told
 SAME = 1e-6  # [m] waypoints nearer to each other are one place
 STEP = 0.001  # [m] between the poses of a refitted path
 LEAST = (1e-6, 1e-5)  # [m], [rad] scatter that counts as none
-MEDIANS = (1.1774, 1.5382)  # of the length of a vector of two and of three independent standard normal components
+QUANTILE = 0.35  # of the waypoints' distances: two corners among a dozen waypoints have no say yet
+LENGTHS = (0.9282, 1.2816)  # that share of vectors of two and of three independent standard normal components is shorter
 STRENGTHS = (1e-14, 1e2)  # of smoothing, over arc length in units of the path's own: none and almost a straight line
 
 
@@ -54,7 +55,7 @@ class Refit:
 def scatter_of(path: TorchPath) -> Scatter:
     """The waypoints' scatter: how far each is from the cubic through the two before and the two after it.
 
-    The median over all waypoints: corners and jumps, which are few, have no say.
+    From the distance that QUANTILE of them keep to: corners and jumps, which are few, have no say.
     """
     places = _places(path)
     if len(places) < FEWEST:
@@ -63,10 +64,10 @@ def scatter_of(path: TorchPath) -> Scatter:
     weights = _cubic_weights(arc_length(p))
     scale = np.sqrt(1.0 + np.sum(weights**2, axis=1))
     out = []
-    for values, median in zip((p, 2.0 * q), MEDIANS, strict=True):  # half the turn stands in a quaternion
+    for values, length in zip((p, 2.0 * q), LENGTHS, strict=True):  # half the turn stands in a quaternion
         around = np.stack([values[i : len(values) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
         off = np.linalg.norm(values[2:-2] - np.einsum("ij,ijk->ik", weights, around), axis=1)
-        out.append(float(np.median(off / scale)) / median)
+        out.append(float(np.quantile(off / scale, QUANTILE)) / length)
     return Scatter(position=out[0], rotation=out[1])
 
 

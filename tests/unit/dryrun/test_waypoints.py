@@ -47,8 +47,8 @@ def kinds(trial: Trial) -> dict[int, str]:
 @pytest.mark.parametrize(("position", "rotation"), [(1e-4, 2e-3), (5e-4, 1e-2), (1e-4, 2e-2)])
 def test_scatter_is_told_as_it_is(position, rotation) -> None:
     found = [scatter_of(waypoints(60, seed=seed, position=position, rotation=rotation)) for seed in range(20)]
-    assert np.median([one.position for one in found]) == pytest.approx(position, rel=0.15)
-    assert np.median([one.rotation for one in found]) == pytest.approx(rotation, rel=0.15)
+    assert np.median([one.position for one in found]) == pytest.approx(position, rel=0.2)
+    assert np.median([one.rotation for one in found]) == pytest.approx(rotation, rel=0.2)
     assert all(0.6 * position < one.position < 1.6 * position for one in found)
 
 
@@ -68,7 +68,7 @@ def test_a_curve_leaves_the_waypoints_by_their_scatter_and_comes_nearer_to_the_t
         off = at - path.X_BT.p
         assert np.sqrt(np.mean(off[:, 1:] ** 2)) == pytest.approx(5e-4, rel=0.35)
         before, after = (np.sqrt(np.mean(project(p, truth)[0] ** 2)) for p in (path.X_BT.p, fitted.path.X_BT.p))
-        assert after < 0.6 * before
+        assert after < 0.75 * before
         assert fitted.position_off >= np.linalg.norm(off, axis=1).max() - 6e-4
 
 
