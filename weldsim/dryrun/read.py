@@ -47,6 +47,7 @@ def read_program(
         InputError: a file that is missing, malformed, in millimetres, with numbers that are not finite, or too short.
     """
     path = Path(path)
+    _refuse_unused(path, tool, base, roll_free)
     if path.suffix.lower() == ".json":
         document = read_path_json(path)
         paths = torch_paths(document, speed=speed)
@@ -67,6 +68,17 @@ def read_program(
     if path.suffix.lower() in TABLES:
         return _csv(path, text, tool, base, speed, bool(roll_free))
     raise InputError(f"{path}: .json (weldsim.path/1), .csv (UR poses) or .script (URScript) is needed", path=str(path))
+
+
+def _refuse_unused(path: Path, tool: Tool | None, base: Base, roll_free: bool | None) -> None:
+    """Raises InputError for what a file of this kind says itself."""
+    suffix = path.suffix.lower()
+    if suffix == ".json" and tool is not None:
+        raise InputError(f"{path}: --tool is for CSV and scripts; poses of a weldsim.path/1 are the wire's tip", path=str(path))
+    if suffix not in TABLES and base != "controller":
+        raise InputError(f"{path}: --base is for CSV; this file's poses are in the controller's base", path=str(path))
+    if suffix in SCRIPTS and roll_free:
+        raise InputError(f"{path}: --roll is for paths; a robot program's poses are taken as they are", path=str(path))
 
 
 def _with_roll(path: TorchPath, roll_free: bool) -> TorchPath:

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from weldsim.dryrun.unknown import NoSolution
 from weldsim.errors import UnreachableError
 from weldsim.frames import Transform
-from weldsim.kinematics import flange_pose, inverse_near
+from weldsim.kinematics import flange_pose, inverse, inverse_near
 from weldsim.urscript.check import six
 from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.values import Pose
@@ -30,7 +31,10 @@ class RobotState:
 
     def to_pose(self, pose: list[float]) -> Transform:
         """The arm goes to a pose of the TCP; its flange's, X_BF."""
-        X_BF = self._flange(pose)
+        return self.to_flange(self._flange(pose))
+
+    def to_flange(self, X_BF: Transform) -> Transform:
+        """The arm goes to a pose of the flange, which is returned."""
         self._since.append(X_BF)
         return X_BF
 
@@ -59,11 +63,20 @@ class RobotState:
 
     def get_inverse_kin(
         self, x: Any, qnear: Any = None, maxPositionError: float = 1e-10, maxOrientationError: float = 1e-10, tcp: Any = None
-    ) -> list[float]:
+    ) -> list[float] | NoSolution:
         """Joint angles that put the TCP at x, those nearest to qnear, by default to where the arm is."""
         near = self._joints("get_inverse_kin") if qnear is None else np.array(six(qnear, "get_inverse_kin"))
-        x = six(x, "get_inverse_kin")
-        return self._near(self._pose_of(x) @ self._mount(tcp).inverse(), near, "get_inverse_kin").tolist()
+        X_BF = self._pose_of(six(x, "get_inverse_kin")) @ self._mount(tcp).inverse()
+        try:
+            return inverse_near(X_BF, near).tolist()
+        except UnreachableError as error:
+            return NoSolution("get_inverse_kin", X_BF, str(error))
+
+    def get_inverse_kin_has_solution(
+        self, x: Any, qnear: Any = None, maxPositionError: float = 1e-10, maxOrientationError: float = 1e-10, tcp: Any = None
+    ) -> bool:
+        """Whether get_inverse_kin finds joint angles."""
+        return len(inverse(self._pose_of(six(x, "get_inverse_kin_has_solution")) @ self._mount(tcp).inverse())) > 0
 
     def _mount(self, tcp: Any) -> Transform:
         if tcp is None or isinstance(tcp, str):
@@ -87,15 +100,10 @@ class RobotState:
             raise ScriptError(f"{name}: where the arm is by then is not known; begin with movej to six joint angles")
         q = self._q
         for X_BF in self._since:
-            q = self._near(X_BF, q, name)
+            if len(inverse(X_BF)):  # out of reach the arm stays where it was, and that motion fails when it is checked
+                q = inverse_near(X_BF, q)
         self._q, self._since = q, []
         return q
-
-    def _near(self, X_BF: Transform, near: np.ndarray, name: str) -> np.ndarray:
-        try:
-            return inverse_near(X_BF, near)
-        except UnreachableError as error:
-            raise ScriptError(f"{name}: {error}") from None
 
 
 def _pose(X: Transform) -> Pose:

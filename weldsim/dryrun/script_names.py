@@ -28,7 +28,7 @@ ASKING = _words(
     socket_read_ascii_float socket_read_byte_list socket_read_binary_integer socket_get_var
     request_boolean_from_primary_client request_integer_from_primary_client request_float_from_primary_client
     request_string_from_primary_client is_steady tool_contact tool_contact_examples get_steptime random rpc_factory
-    get_conveyor_tick_count encoder_get_tick_count encoder_unwind_delta_tick_count get_inverse_kin_has_solution
+    get_conveyor_tick_count encoder_get_tick_count encoder_unwind_delta_tick_count
     is_within_safety_limits
     """
 )

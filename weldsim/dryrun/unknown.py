@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any
 
+from weldsim.frames import Transform
 from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.values import OPERATIONS, store
 
@@ -33,6 +34,14 @@ class Unknown:
     __eq__ = __ne__ = __lt__ = __gt__ = __le__ = __ge__ = _same
 
 
+class NoSolution(Unknown):
+    """Joint angles for a pose that the arm does not reach. Attributes: X_BF, the pose; reason."""
+
+    def __init__(self, what: str, X_BF: Transform, reason: str) -> None:
+        super().__init__(f"{what}: {reason}")
+        self.X_BF = X_BF
+
+
 def unknown_among(*values: object) -> Unknown | None:
     """The first unknown value among these and in their lists, or None."""
     for value in values:
@@ -52,17 +61,6 @@ def spreading(function: Callable) -> Callable:
         return function(*arguments, **named) if found is None else found
 
     return spread
-
-
-def decided(function: Callable) -> Callable:
-    """The function, which raises UntoldError where one of its arguments is unknown."""
-
-    @wraps(function)
-    def decide(*arguments: object, **named: object) -> Any:
-        bool(unknown_among(*arguments, *named.values()))
-        return function(*arguments, **named)
-
-    return decide
 
 
 def _item(value: Any, indices: tuple[Any, ...]) -> Any:

@@ -7,6 +7,7 @@ it cannot be told beforehand and is refused where they begin to.
 
 import sys
 from collections.abc import Callable, Iterator
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from weldsim.dryrun.program import Command, Motion, Program
 from weldsim.dryrun.robot_state import RobotState
 from weldsim.dryrun.script_names import ASKING, MOVES, MOVING, OUTPUTS, RESTING, SILENT
 from weldsim.dryrun.script_notes import ScriptNotes
-from weldsim.dryrun.unknown import UNKNOWN_OPERATIONS, Unknown, UntoldError, decided, spreading, unknown_among
+from weldsim.dryrun.unknown import UNKNOWN_OPERATIONS, NoSolution, Unknown, UntoldError, spreading, unknown_among
 from weldsim.errors import InputError
 from weldsim.frames import Transform
 from weldsim.mounts import X_FT
@@ -118,29 +119,39 @@ class _Recorder:
             for name in dir(group)
             if not name.startswith("_") and callable(getattr(group, name))
         }
+        solve = out["get_inverse_kin"]
+
+        @wraps(solve)
+        def get_inverse_kin(*arguments: Any, **named: Any) -> Any:
+            self._tell_of_tcp()
+            return solve(*arguments, **named)
+
+        out["get_inverse_kin"] = get_inverse_kin
         out |= {name: self._asking(name) for name in ASKING}
         out |= {name: self._passed_over(name) for name in SILENT}
         out |= {name: _refusing(f"{name}: its motion is not checked; use movej, movel, movep or servoj") for name in MOVING}
         out |= dict.fromkeys(RESTING, lambda *_, **__: None)
         out |= {name: self._output(name) for name in OUTPUTS}
         mine = (self.movej, self.movel, self.movep, self.servoj, self.set_tcp)
-        return out | {function.__name__: decided(function) for function in mine} | {"sleep": self.sleep}
+        return out | {function.__name__: function for function in mine} | {"sleep": self.sleep}
 
-    def movej(self, q: Any, a: float = 1.4, v: float = 1.05, t: float = 0, r: float = 0) -> None:
+    def movej(self, q: Any, a: Any = 1.4, v: Any = 1.05, t: Any = 0, r: Any = 0) -> None:
         self._move("movej", q, a, v, t, r)
 
-    def movel(self, pose: Any, a: float = 1.2, v: float = 0.25, t: float = 0, r: float = 0) -> None:
+    def movel(self, pose: Any, a: Any = 1.2, v: Any = 0.25, t: Any = 0, r: Any = 0) -> None:
         self._move("movel", pose, a, v, t, r)
 
-    def movep(self, pose: Any, a: float = 1.2, v: float = 0.25, r: float = 0) -> None:
+    def movep(self, pose: Any, a: Any = 1.2, v: Any = 0.25, r: Any = 0) -> None:
         self._move("movep", pose, a, v, 0, r)
 
-    def servoj(self, q: Any, a: float = 0, v: float = 0, t: float = 0.008, lookahead_time: float = 0.1, gain: float = 300) -> None:
+    def servoj(self, q: Any, a: Any = 0, v: Any = 0, t: Any = 0.008, lookahead_time: Any = 0.1, gain: Any = 300) -> None:
+        bool(unknown_among(t))
         if not number(t) > 0:
             raise ScriptError(f"servoj: time {t:g} s must be positive")
         self._record("servoj", q, 0.0, 0.0, t)
 
     def set_tcp(self, pose: Any, tcp_name: str = "") -> None:
+        bool(unknown_among(pose))
         if not isinstance(pose, list) or len(pose) != 6:
             raise ScriptError("set_tcp: p[x, y, z, rx, ry, rz] is needed")
         x = six(pose, "set_tcp")
@@ -149,7 +160,7 @@ class _Recorder:
         if self.fixed is None:
             self.state.mount = Transform.from_rotation_vector("FT", np.array(x[3:]), np.array(x[:3]))
 
-    def sleep(self, t: float) -> None:
+    def sleep(self, t: Any) -> None:
         if isinstance(t, Unknown):
             self.notes.passed_over(t.what, self._line() or 0, wait=True)
             return
@@ -158,6 +169,7 @@ class _Recorder:
         self.pauses += t
 
     def _move(self, name: Command, target: Any, a: Any, v: Any, t: Any, r: Any) -> None:
+        bool(unknown_among(a, v, t, r))
         if not (0 < number(v) < np.inf and 0 < number(a) < np.inf):
             raise ScriptError(f"{name}: speed {v:g} and acceleration {a:g} must be positive")
         if not (0 <= number(t) < np.inf and 0 <= number(r) < np.inf):
@@ -167,30 +179,38 @@ class _Recorder:
         self._record(name, target, float(v), float(a), t)
 
     def _record(self, name: Command, target: Any, speed: float, acceleration: float, t: float) -> None:
+        q, X_BT = self._joints_and_pose(name, target)
+        kept = {"speed": speed, "acceleration": acceleration, "t": float(t), "arc": bool(self.on)}
+        self.motions.append(Motion(command=name, line=self._line() or 0, q=q, X_BT=X_BT, **kept))  # type: ignore[arg-type]
+
+    def _joints_and_pose(self, name: Command, target: Any) -> tuple[Float[ndarray, "6"] | None, Transform | None]:
+        """The target of a motion as joint angles [rad], or as a pose of the torch, which hangs on the flange whatever the TCP."""
+        if isinstance(target, NoSolution):
+            return None, self.state.to_flange(target.X_BF) @ X_FT
+        bool(unknown_among(target))
         if not isinstance(target, list) or len(target) != 6:
             raise ScriptError(f"{name}: the target must be p[x, y, z, rx, ry, rz] or [six joint angles]")
         values = six(target, f"{name}: target")
-        q, X_BT = None, None
         if is_pose(target):
             _check_pose(values, f"{name}: ", "from the base", FURTHEST)
-            if not self.tcp_set and self.fixed is None:
-                self.notes.add(
-                    "no tcp",
-                    "the program sets no TCP before its first pose: poses are read as the wire's tip"
-                    " (--tool tool0 reads them as the bare flange)",
-                )
-            X_BT = self.state.to_pose(values) @ X_FT  # the torch hangs on the flange whatever the TCP is
-        else:
-            q = np.array(values)
-            if np.abs(q).max() > LARGEST_ANGLE:
-                raise ScriptError(f"{name}: a joint at {np.abs(q).max():.4g} rad: looks like degrees")
-            self.state.to_joints(values)
-        line = self._line() or 0
-        kept = {"speed": speed, "acceleration": acceleration, "t": float(t), "arc": bool(self.on)}
-        self.motions.append(Motion(command=name, line=line, q=q, X_BT=X_BT, **kept))  # type: ignore[arg-type]
+            self._tell_of_tcp()
+            return None, self.state.to_pose(values) @ X_FT
+        q = np.array(values)
+        if np.abs(q).max() > LARGEST_ANGLE:
+            raise ScriptError(f"{name}: a joint at {np.abs(q).max():.4g} rad: looks like degrees")
+        self.state.to_joints(values)
+        return q, None
+
+    def _tell_of_tcp(self) -> None:
+        if not self.tcp_set and self.fixed is None:
+            self.notes.add(
+                "no tcp",
+                "the program sets no TCP before its first pose: poses are read as the wire's tip"
+                " (--tool tool0 reads them as the bare flange)",
+            )
 
     def _output(self, name: str) -> Callable:
-        def switch(n: int, b: bool) -> None:
+        def switch(n: Any, b: Any) -> None:
             if (asked := unknown_among(n, b)) is not None:
                 self.notes.passed_over(asked.what, self._line() or 0, wait=False)
                 return

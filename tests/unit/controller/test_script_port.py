@@ -52,13 +52,11 @@ def test_output_that_the_installation_drops_is_low_once_no_program_runs():
     assert machine.io.digital_out == 1 << 5
 
 
-@pytest.mark.parametrize("size", [1, 1000])
-@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
 @pytest.mark.parametrize(
-    ("series", "text"),
+    ("series", "text", "size", "encoding"),
     [
-        ("cb3", exported(HEAD_3, COUNTER, GRIPPER, TIMER)),
-        ("e", exported(HEAD_5, COUNTER, TIMER, GRIPPER)),
+        ("cb3", exported(HEAD_3, COUNTER, GRIPPER, TIMER), 1, "utf-8"),
+        ("e", exported(HEAD_5, COUNTER, TIMER, GRIPPER), 1000, "latin-1"),
     ],
 )
 def test_a_program_that_polyscope_exported_runs_to_its_end(series, text, size, encoding):

@@ -321,3 +321,20 @@ def test_the_option_that_a_note_recommends_is_taken_and_the_note_is_gone(tmp_pat
     assert said == pytest.approx([0.0, -0.45, 0.3], abs=1e-9)
     if chosen.motions:
         assert len(try_script(chosen, empty_cell(np.array(HOME_ARM))).verdicts) == len(poses)
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "says"),
+    [
+        ("p.json", {"tool": "tool0"}, "--tool is for CSV and scripts"),
+        ("p.json", {"base": "base_link"}, "--base is for CSV"),
+        ("p.script", {"base": "base_link"}, "--base is for CSV"),
+        ("p.script", {"roll_free": True}, "--roll is for paths"),
+    ],
+)
+def test_an_option_that_a_file_has_no_use_for_is_refused(tmp_path, name, said, says) -> None:
+    file = tmp_path / name
+    file.write_text(json.dumps(_document()) if name.endswith("json") else f"movel(p[{POSE}])\nmovel(p[{POSE}])")
+    read_program(file)
+    with pytest.raises(InputError, match=says):
+        read_program(file, **said)
