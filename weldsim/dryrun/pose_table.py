@@ -20,7 +20,10 @@ POSE = re.compile(r"\s*\"?\s*p?\[(.*)\]\s*\"?\s*[,;]?\s*")  # a pose as robot pr
 ROTATION = re.compile(r"(?:r|rv|rot|rotvec|rotation|rotvector|rotationvector)[ _.:-]*([xyz])")
 RECORDED = re.compile(r"(?:actual|target)_tcp_pose[ _.:-]?([0-5])")  # as ur_rtde and UR's own recorder call them
 OF_THE_TOOL = re.compile(r"(?:tcp|tool0|tool|tip|torch|flange|ee)[ _.:-]+")
-JOINT = re.compile(r"(?:actual_|target_)?(?:q|j|joint|axis)[ _.:-]?\d|base|shoulder(?: |_|$).*|elbow.*|wrist.*|shoulder_pan.*")
+JOINT = re.compile(
+    r"(?:actual_|target_)?(?:q|j|a|joint|axis|theta|gelenk|achse)[ _.:-]?\d(?:[ _](?:deg|rad))?"
+    r"|base|shoulder(?:[ _].*)?|elbow(?:[ _].*)?|wrist.*"
+)
 IN_METRES = ("", "m", "rad", "m/s", "s")
 
 
@@ -123,7 +126,7 @@ def _columns(table: TextTable, lines: list[str], where: str) -> tuple[list[int],
         found[wanted] = i
     listed = ", ".join(name.text for name in table.names if name.text)[:120]
     if missing := [name for name in WANTED if name not in found]:
-        joints = sum(JOINT.fullmatch(name.text.lower()) is not None for name in table.names) >= len(WANTED)
+        joints = sum(JOINT.fullmatch(_bare(name)) is not None for name in table.names) >= len(WANTED)
         hint = "these are joint angles: movej in a .script takes them; " if joints else ""
         raise InputError(
             f"{where}: column {missing[0]} is missing among {listed}; {hint}x y z rx ry rz [m, rad] are needed", path=where
@@ -141,7 +144,7 @@ def _columns(table: TextTable, lines: list[str], where: str) -> tuple[list[int],
 
 def _wanted(name: ColumnName) -> str | None:
     """Which of x y z rx ry rz a column holds, or None."""
-    bare = re.sub(r"[\[({].*", "", name.text.lower()).strip()
+    bare = _bare(name)
     if (recorded := RECORDED.fullmatch(bare)) is not None:
         return WANTED[int(recorded[1])]
     bare = OF_THE_TOOL.sub("", bare)
@@ -150,6 +153,11 @@ def _wanted(name: ColumnName) -> str | None:
         return f"r{turn[1]}"
     role = read_name(bare).role
     return role if role in AXES else None
+
+
+def _bare(name: ColumnName) -> str:
+    """A column's name without the unit in brackets, lower case."""
+    return re.sub(r"[\[({].*", "", name.text.lower()).strip()
 
 
 def _unit(name: ColumnName) -> str:

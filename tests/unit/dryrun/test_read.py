@@ -298,9 +298,15 @@ def test_joint_angles_go_into_a_script_as_the_message_says(tmp_path) -> None:
     script = tmp_path / "angles.script"
     script.write_text("\n".join(f"movej([{', '.join(f'd2r({value})' for value in row)}])" for row in ANGLES))
     assert np.allclose([motion.q for motion in read_program(script).motions], np.deg2rad(ANGLES))
-    file.write_text("base,shoulder,elbow,wrist1,wrist2,wrist3\n" + file.read_text())
-    with pytest.raises(InputError, match="these are joint angles"):
-        read_program(file)
+    body = file.read_text()
+    for head in (
+        "base,shoulder,elbow,wrist1,wrist2,wrist3",
+        "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]",
+        "q0,q1,q2,q3,q4,q5",
+    ):
+        file.write_text(f"{head}\n{body}")
+        with pytest.raises(InputError, match="these are joint angles: movej in a .script"):
+            read_program(file)
     np.savetxt(file, np.deg2rad(ANGLES), delimiter=",")
     assert any("if these are six joint angles" in note for note in read_program(file).notes)
 
