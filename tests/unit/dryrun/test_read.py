@@ -305,7 +305,7 @@ def test_joint_angles_go_into_a_script_as_the_message_says(tmp_path) -> None:
         "q0,q1,q2,q3,q4,q5",
     ):
         file.write_text(f"{head}\n{body}")
-        with pytest.raises(InputError, match="these are joint angles: movej in a .script"):
+        with pytest.raises(InputError, match=r"these are joint angles: movej in a \.script"):
             read_program(file)
     np.savetxt(file, np.deg2rad(ANGLES), delimiter=",")
     assert any("if these are six joint angles" in note for note in read_program(file).notes)
