@@ -55,7 +55,7 @@ def _worth_refitting(path: TorchPath, trial: Trial) -> bool:
 def _fits(path: TorchPath, scatter: Scatter, config: MotionConfig) -> list[Refit]:
     """Curves within tolerance, the smoothest first; none where they would be the straight lines between the waypoints."""
     out = [fitted for fitted in (refit(path, scatter, share) for share in CLOSER) if _within(fitted, scatter)]
-    return out if out and out[0].chord_off + out[0].rotation_off > config.spline_tolerance else []
+    return [fitted for fitted in out if fitted.chord_off > config.spline_tolerance or fitted.rotation_off > TOLD[1]]
 
 
 def _within(fitted: Refit, scatter: Scatter) -> bool:
