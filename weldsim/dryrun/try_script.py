@@ -7,7 +7,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell
-from weldsim.dryrun.path_faults import FASTEST
+from weldsim.dryrun.path_faults import BACK, FASTEST, LEAST_BACK
 from weldsim.dryrun.program import Motion, Program
 from weldsim.dryrun.verdict import Trial, Verdict, Why
 from weldsim.frames import Transform, rotation_vector_from_matrix, slerp
@@ -88,7 +88,26 @@ def try_script(program: Program, cell: Cell) -> Trial:
         p_worst=p_worst,
         points_B=torch_pose(all_q).p if len(all_q) > 1 else np.zeros((0, 3)),
         length=length,
+        notes=_turning_back(program),
     )
+
+
+def _turning_back(program: Program) -> tuple[str, ...]:
+    """Where a process move (movep, or a straight one with the arc on) leads back over the one before it, one sentence each."""
+    out = []
+    targets = [
+        None if motion.X_BT is None or motion.command not in ("movel", "movep") else motion.X_BT.p for motion in program.motions
+    ]
+    for a, b, c, motion, after in zip(targets, targets[1:], targets[2:], program.motions[1:], program.motions[2:], strict=False):
+        process = all(each.command == "movep" or each.arc for each in (motion, after))
+        if a is None or b is None or c is None or not process:
+            continue
+        there, back = b - a, c - b
+        lengths = np.linalg.norm(there), np.linalg.norm(back)
+        if min(lengths) > LEAST_BACK and float(there @ back) < np.cos(BACK) * lengths[0] * lengths[1]:
+            turn = np.rad2deg(np.arccos(np.clip(there @ back / (lengths[0] * lengths[1]), -1.0, 1.0)))
+            out.append(f"line {after.line} {after.command}: travel turns back by {turn:.0f} deg")
+    return tuple(out)
 
 
 def _bad_start(q: Float[ndarray, "6"], cell: Cell) -> str:

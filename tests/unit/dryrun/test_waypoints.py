@@ -189,3 +189,15 @@ def test_the_table_names_every_failure_once(tmp_path, capsys) -> None:
     out = capsys.readouterr().out
     assert out.count("travel turns back by") == 4
     assert out.count("not reached") == 1
+
+
+@pytest.mark.parametrize("welding", [("movep", False), ("movel", True), ("movel", False)])
+def test_a_program_that_welds_back_over_itself_is_told(empty: Cell, tmp_path, welding) -> None:
+    command, arc = welding
+    rows = [f"  {command}(p[{x}, -0.45, 0.2, 0.0, 3.14, 0.0], a=0.5, v=0.02)" for x in (0.0, 0.05, 0.02, 0.06)]
+    lines = ["def job():", "  movej([-1.57, -1.3, -1.9, -1.5, 1.57, 0])", f"  set_digital_out(1, {arc})", *rows, "end"]
+    file = tmp_path / "job.script"
+    file.write_text("\n".join(lines))
+    notes = dry_run(read_program(file), empty, fix=False).trials[0].notes
+    told = [f"line {line} {command}: travel turns back by 180 deg" for line in (6, 7)]
+    assert notes == (() if welding == ("movel", False) else tuple(told))
