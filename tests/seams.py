@@ -76,12 +76,29 @@ def torch_path(seam: Seam, speed: float = 6e-3) -> TorchPath:
 
 
 def weld_log(
-    path: TorchPath, rng: np.random.Generator, *, jitter: float = 0.0, factor: float = 1.0, period: float = 0.008
+    path: TorchPath,
+    rng: np.random.Generator,
+    *,
+    jitter: float = 0.0,
+    factor: float = 1.0,
+    period: float = 0.008,
+    slow: tuple[float, float, float] | None = None,
+    dwell: tuple[float, float] | None = None,
 ) -> ExecutionLog:
-    """A weld along `path` at `factor` times its speed, with approach and retract 20 mm above, and jitter [m] of the tip."""
+    """A weld along `path` at `factor` times its speed, with approach and retract 20 mm above, and jitter [m] of the tip.
+
+    Args:
+        slow: from and to where it is slower or faster [m], and how many times the speed it has there.
+        dwell: where it stands still with the arc on [m], and for how long [s].
+    """
     speed = float(path.speed[0]) * factor
-    t_weld = np.arange(0.0, path.s[-1] / speed, period)
-    s = t_weld * speed
+    a, b, share = slow or (0.0, 0.0, 1.0)
+    at = np.arange(0.0, path.s[-1], 1e-5)
+    t_at = np.concatenate([[0.0], np.cumsum(1e-5 / (speed * np.where((at >= a) & (at < b), share, 1.0)))[:-1]])
+    if dwell is not None:
+        at, t_at = np.insert(at, k := int(dwell[0] / 1e-5), at[k]), np.insert(t_at, k, t_at[k])
+        t_at[k + 1 :] += dwell[1]
+    s = np.interp(np.arange(0.0, t_at[-1] + 1e-5 / speed, period), t_at, at)
     p = np.stack([np.interp(s, path.s, c) for c in path.X_BT.p.T], axis=1)
     index = np.searchsorted(path.s, s).clip(0, len(path.s) - 1)
     R = path.X_BT.R[index]

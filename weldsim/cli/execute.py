@@ -10,7 +10,7 @@ import tyro
 from weldsim.cli.dry_run import failures
 from weldsim.cli.options import ConfigOptions
 from weldsim.cli.outputs import check_folder, nearest_folder
-from weldsim.cli.show import print_json, progress, table, times
+from weldsim.cli.show import check_rows, print_json, progress, table, times
 from weldsim.cli.signals import INTERRUPTED, interrupted_once
 from weldsim.errors import InputError
 
@@ -163,12 +163,13 @@ class Execute(ConfigOptions):
             from weldsim.report.limits import checks
 
             found = checks(done.report, limits_for(config, scene))
-            rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in found]
-            if rows:
-                print(table(rows, ("figure", "measured", "limit", "")))
+            if found:
+                print(table(check_rows(found), ("figure", "measured", "limit", "")))
             for reason in () if done.report.passed else done.report.reasons:
                 if reason != str(done.stopped):  # which stands above
                     print(f"  {reason}")
+            for warning in done.report.warnings:
+                print(f"  amber: {warning}")
         if done.log is not None:
             pace = "" if job.speed_scale == 1 else f" at {100 * job.speed_scale:g} % of the pace"
             print(f"  arc {_arc(done.log, job)}; {done.log.t[-1] - done.log.t[0]:.1f} s{pace}")

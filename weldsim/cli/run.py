@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
-from weldsim.cli.show import print_json, progress, table, times
+from weldsim.cli.show import check_rows, print_json, progress, table, times
 from weldsim.errors import InputError, SensorError
 from weldsim.sensor.choose import SensorName
 
 if TYPE_CHECKING:
     from weldsim.records import WeldReport
     from weldsim.report.limits import ReportConfig
-
-MARKS = {True: "ok", False: "FAIL", None: ""}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,12 +108,16 @@ class Run(ConfigOptions):
         print_json({**report_json(report, limits), "written": [str(path) for path in written]})
 
     def _print(self, report: "WeldReport", limits: "ReportConfig", found: int, written: list[Path], notes: tuple[str, ...]) -> None:
-        from weldsim.report.limits import checks, verdict
+        from weldsim.report.limits import checks
+        from weldsim.report.verdict import verdict
 
         word, why = verdict(report, found, limits)
         print(f"{report.scene}, seed {report.seed}, {self.sensor}, method {report.method}: {word}, {why}")
-        rows = [[check.figure, check.value, check.limit, MARKS[check.passed]] for check in checks(report, limits)]
-        print(table(rows, ("figure", "measured", "limit", "")))
+        print(table(check_rows(checks(report, limits)), ("figure", "measured", "limit", "")))
+        for reason in () if report.passed else report.reasons[1:]:
+            print(f"  {reason}")
+        for warning in report.warnings:
+            print(f"  amber: {warning}")
         for note in notes:
             print(f"  {note}")
         print(times(report.timing))

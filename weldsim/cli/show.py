@@ -3,9 +3,12 @@
 import json
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from weldsim.report.limits import Check
 
 PATIENCE = 1.0  # [s] before progress is shown
 
@@ -19,6 +22,12 @@ def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
     return "\n".join(
         "  " + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
     )
+
+
+def check_rows(checks: "Iterable[Check]") -> list[list[str]]:
+    """Lines of a table of figures beside their limits."""
+    marks = {True: "ok", False: "FAIL", None: ""}
+    return [[c.figure, c.value, c.limit, "amber" if c.passed and c.amber else marks[c.passed]] for c in checks]
 
 
 def times(seconds: dict[str, float]) -> str:

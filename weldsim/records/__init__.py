@@ -8,7 +8,7 @@ array is expressed in the robot base.
 from weldsim.records.checks import MILLIMETRE_SPAN
 from weldsim.records.execution import Event, ExecutionLog, RobotFacts, RobotState
 from weldsim.records.motion import JointTrajectory, Segment, TorchPath
-from weldsim.records.report import LineError, WeldReport
+from weldsim.records.report import LineError, Pace, WeldProgress, WeldReport
 from weldsim.records.seam import Joint, KnownSeam, Reference, Rejection, Seam, SeamFindings, Threshold
 from weldsim.records.sensing import CameraIntrinsics, DepthFrame, PointCloud
 
@@ -22,6 +22,7 @@ __all__ = [
     "JointTrajectory",
     "KnownSeam",
     "LineError",
+    "Pace",
     "PointCloud",
     "Reference",
     "Rejection",
@@ -32,5 +33,6 @@ __all__ = [
     "Segment",
     "Threshold",
     "TorchPath",
+    "WeldProgress",
     "WeldReport",
 ]

@@ -9,18 +9,19 @@ from weldsim import units
 from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
 from weldsim.report import figures
-from weldsim.report.limits import Check, ReportConfig, checks, verdict
+from weldsim.report.limits import Check, ReportConfig, checks
+from weldsim.report.verdict import look, verdict
 from weldsim.report.view import cross_section, error_lines, shows_surface
 
 STYLE = """
-:root{--ink:#1c2733;--soft:#66727f;--line:#e3e7eb;--good:#1b7f4b;--bad:#b3261e;--plain:#12355b}
+:root{--ink:#1c2733;--soft:#66727f;--line:#e3e7eb;--good:#1b7f4b;--bad:#b3261e;--amber:#a85b00;--plain:#12355b}
 *{box-sizing:border-box}
 body{margin:0;background:#f3f5f7;color:var(--ink);font:15px/1.45 system-ui,"Segoe UI",Roboto,"Liberation Sans",sans-serif}
 main{max-width:1280px;margin:0 auto;padding:24px}
 header{display:flex;justify-content:space-between;align-items:center;gap:24px;margin-bottom:16px}
 h1{font-size:26px;margin:0}h2{font-size:17px;margin:0 0 10px}p{margin:4px 0;color:var(--soft)}
 .verdict{padding:10px 20px;border-radius:8px;color:#fff;font-weight:700;font-size:20px;white-space:nowrap}
-.good{background:var(--good)}.bad{background:var(--bad)}.plain{background:var(--plain)}
+.good{background:var(--good)}.amber{background:var(--amber)}.bad{background:var(--bad)}.plain{background:var(--plain)}
 .reasons{border-left:4px solid var(--bad);margin:0 0 16px;padding:10px 16px 10px 32px;background:#fff}
 .cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(132px,1fr));gap:12px;margin-bottom:16px}
 .card,section{background:#fff;border:1px solid var(--line);border-radius:8px;padding:14px 16px}
@@ -32,7 +33,7 @@ table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 th{text-align:left;color:var(--soft);font-weight:600;font-size:13px}
 th,td{padding:5px 10px 5px 0;border-bottom:1px solid var(--line);vertical-align:top}
 tr:last-child td{border-bottom:0}.num{white-space:nowrap}
-.mark{white-space:nowrap;font-weight:600}.mark.ok{color:var(--good)}.mark.no{color:var(--bad)}
+.mark{white-space:nowrap;font-weight:600}.mark.ok{color:var(--good)}.mark.no{color:var(--bad)}.mark.look{color:var(--amber)}
 .bar{height:10px;background:#7d9bb8;border-radius:3px;min-width:2px}
 footer{color:var(--soft);font-size:13px;overflow-wrap:anywhere}
 """
@@ -136,13 +137,13 @@ def _figure(drawn: list[figures.Figure], title: str, figure: figures.Figure) -> 
 
 def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) -> str:
     word, why = verdict(report, len(findings.seams), config)
-    look = "bad" if word == "FAILED" else "good" if word == "PASSED" else "plain"
     listed = "" if report.passed else "".join(f"<li>{escape(reason)}</li>" for reason in report.reasons)
-    listed += "".join(f"<li>{escape(clause)}</li>" for clause in report.unplanned)
+    listed += "".join(f"<li>{escape(clause)}</li>" for clause in (*report.warnings, *report.unplanned))
     facts = f"{why}; method {report.method}, seed {report.seed}"
     return (
         f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"
-        f'<div class="verdict {look}">{escape(word)}</div></header>' + (f'<ul class="reasons">{listed}</ul>' if listed else "")
+        f'<div class="verdict {look(word)}">{escape(word)}</div></header>'
+        + (f'<ul class="reasons">{listed}</ul>' if listed else "")
     )
 
 
@@ -179,10 +180,11 @@ def _checks(listed: tuple[Check, ...]) -> str:
     if not listed:
         return ""
     marks = {True: '<td class="mark ok">kept</td>', False: '<td class="mark no">exceeded</td>', None: "<td></td>"}
+    amber = '<td class="mark look">amber</td>'
     rows = []
     for c in listed:
         figure = f'<td>{escape(c.figure)}</td><td class="num">{escape(c.value)}</td><td class="num">{escape(c.limit)}</td>'
-        rows.append(f"<tr>{figure}{marks[c.passed]}</tr>")
+        rows.append(f"<tr>{figure}{amber if c.passed and c.amber else marks[c.passed]}</tr>")
     half = -(-len(rows) // 2)
     tables = "".join(_table(("figure", "value", "limit", ""), part) for part in (rows[:half], rows[half:]) if part)
     return f'<section><h2>Figures and limits</h2><div class="two">{tables}</div></section>'

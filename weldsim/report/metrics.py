@@ -143,6 +143,7 @@ def line_error(
         axis_median=float(np.median(angle)),
         axis_p95=float(np.percentile(angle, 95)),
         reference=reference,
+        closed=known.closed,
     )
 
 

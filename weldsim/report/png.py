@@ -18,9 +18,10 @@ from weldsim import units
 from weldsim.frames import Transform
 from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, TorchPath, WeldReport
-from weldsim.report.limits import ReportConfig, verdict
-from weldsim.report.style import BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
+from weldsim.report.limits import ReportConfig
+from weldsim.report.style import AMBER, BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
+from weldsim.report.verdict import look, verdict
 from weldsim.report.view import (
     MARGIN,
     CrossSection,
@@ -84,7 +85,7 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
         word,
         fontsize=20,
         weight="bold",
-        color={"PASSED": GOOD, "FAILED": BAD}.get(word, WIRE),
+        color={"good": GOOD, "amber": AMBER, "bad": BAD, "plain": WIRE}[look(word)],
         va="center",
         ha="right",
     )

@@ -73,12 +73,29 @@ def tracking_error(tip_B: Float[ndarray, "k 3"], planned_B: Float[ndarray, "n 3"
     )
 
 
-def speed_error(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = None) -> SpeedError | None:
-    """Relative speed error while the arc burns; None when the weld is shorter than its ramps.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TorchSpeed:
+    """Measured torch speed at every instant with the arc on.
+
+    Attributes:
+        t: (k,) [s].  s: (k,) arc length that was commanded [m].  speed, planned: (k,) measured and asked for [m/s].
+        lit, out: (k,) when the arc of this piece of the weld was lit and when it went out [s].
+    """
+
+    t: Float[ndarray, "k"]
+    s: Float[ndarray, "k"]
+    speed: Float[ndarray, "k"]
+    planned: Float[ndarray, "k"]
+    lit: Float[ndarray, "k"]
+    out: Float[ndarray, "k"]
+
+
+def torch_speed(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = None) -> TorchSpeed | None:
+    """Torch speed while the arc burns; None when it did not.
 
     Args:
         log: what the arm did.  path: what was planned; its speed is looked up at the commanded arc length.
-        rule: the averaging window and the ramps left out.
+        rule: the averaging window.
     """
     rule = rule or SpeedRule()
     on = np.flatnonzero(log.arc_on)
@@ -92,17 +109,31 @@ def speed_error(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = Non
     times = [np.clip(t + h, lit, out) for h in (-half, half)]
     before, after = (np.stack([np.interp(at, log.t, column) for column in p.T], axis=1) for at in times)
     speed = np.linalg.norm(after - before, axis=1) / np.maximum(times[1] - times[0], 1e-9)
-    planned = np.interp(log.s_cmd[on], path.s, path.speed)
-    judged = (t >= lit + rule.ramp) & (t <= out - rule.ramp)
+    s = log.s_cmd[on]
+    return TorchSpeed(t=t, s=s, speed=speed, planned=np.interp(s, path.s, path.speed), lit=lit, out=out)
+
+
+def speed_error(log: ExecutionLog, path: TorchPath, rule: SpeedRule | None = None) -> SpeedError | None:
+    """Relative speed error while the arc burns; None when the weld is shorter than its ramps.
+
+    Args:
+        log: what the arm did.  path: what was planned; its speed is looked up at the commanded arc length.
+        rule: the averaging window and the ramps left out.
+    """
+    rule = rule or SpeedRule()
+    found = torch_speed(log, path, rule)
+    if found is None:
+        return None
+    judged = (found.t >= found.lit + rule.ramp) & (found.t <= found.out - rule.ramp)
     if not judged.any():
         return None
-    error = np.abs(speed - planned)[judged] / planned[judged]
+    error = np.abs(found.speed - found.planned)[judged] / found.planned[judged]
     return SpeedError(
         p95=float(np.percentile(error, 95)),
         max=float(error.max()),
-        s=log.s_cmd[on],
-        speed=speed,
-        planned=planned,
+        s=found.s,
+        speed=found.speed,
+        planned=found.planned,
         judged=judged,
     )
 

@@ -10,10 +10,13 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from weldsim.quantity import Metre
-from weldsim.records import ExecutionLog, KnownSeam, LineError, Seam, SeamFindings, TorchPath, WeldReport
+from weldsim.records import ExecutionLog, KnownSeam, LineError, Seam, SeamFindings, TorchPath, WeldProgress, WeldReport
 from weldsim.report.limits import ReportConfig, checks
 from weldsim.report.metrics import line_error, match_seams, region_overlap, sigma_coverage
+from weldsim.report.misses import miss, steady_offset
+from weldsim.report.pace import paces
 from weldsim.report.tracking import speed_error, thinned, tracking_error
+from weldsim.report.verdict import warnings
 
 REPORT_SCHEMA = "weldsim.report/1"
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mujoco", "mink", "ruckig", "open3d")
@@ -30,6 +33,9 @@ def weld_report(
     welded: int = 0,
     unplanned: tuple[str, ...] = (),
     trims: tuple[Metre, Metre] = (0.0, 0.0),
+    unjudged: tuple[tuple[str, str], ...] = (),
+    stopped: str | None = None,
+    progress: WeldProgress | None = None,
     timing: dict[str, float] | None = None,
     seed: int = 0,
     config_digest: str = "",
@@ -46,14 +52,16 @@ def weld_report(
         welded: which of the paths is judged.
         unplanned: found seams without a path, a clause each.
         trims: length left out on purpose at the start and end of the weld [m]; it is not missed.
+        unjudged: figures that nothing is known to judge by, and why.
+        stopped: why the arm was stopped before the end.  progress: how far it came.
         timing: seconds a stage.  seed, config_digest: what it ran with.
         config: the limits.
 
-    The verdict is passed when every judged figure keeps its limit, no known seam is missed and, where seams are known
-    or unknown (not ()), at least one was found. Reasons are the failures, or what was found in order.
+    The verdict is passed when nothing stopped the weld, every judged figure keeps its limit, no known seam is missed and, where
+    seams are known or unknown (not ()), at least one was found. Reasons are the failures, or what was found in order.
     """
     config = config or ReportConfig()
-    failures: list[str] = []
+    failures: list[str] = [] if stopped is None else [stopped]
     draft = WeldReport(
         passed=False,
         reasons=(),
@@ -61,22 +69,59 @@ def weld_report(
         method=findings.method,
         iou=None if true_region is None else region_overlap(findings.region > 0, true_region),
         unplanned=unplanned,
+        unjudged=unjudged,
+        seam=welded + 1,
+        welded=int(log is not None and bool(log.arc_on.any())),
+        seams=len(findings.seams) if known is None else len(known),
+        stopped=stopped,
+        progress=progress,
         timing=dict(timing or {}),
         seed=seed,
         config_digest=config_digest,
         versions=versions(),
     )
     if known is not None:
-        draft = _against_known(draft, findings, paths, log, known, welded, trims, failures)
+        draft = _against_known(draft, findings, paths, log, known, welded, trims, failures, config)
     elif not findings.seams:
         failures.append("no seam was found")
     path = paths[welded] if welded < len(paths) else None
     if log is not None and path is not None:
-        draft = _against_plan(draft, path, log, failures)
-    judged = [check for check in checks(draft, config) if check.passed is not None]
+        draft = _against_plan(draft, path, log, failures, config)
+    listed = checks(draft, config)
+    judged = [check for check in listed if check.passed is not None]
     failures += [check.clause for check in judged if not check.passed]
     kept = tuple(check.clause for check in judged) or (f"{len(findings.seams)} found; no known seam to compare with",)
-    return replace(draft, passed=not failures, reasons=tuple(failures) or kept)
+    return replace(draft, passed=not failures, reasons=tuple(failures) or kept, warnings=warnings(draft, listed))
+
+
+def joined(reports: tuple[WeldReport, ...], config: ReportConfig | None = None) -> WeldReport:
+    """One report of a job that welded several seams of one findings: the first, with the others in it.
+
+    Args:
+        reports: as `weld_report` gives them, one a seam.  config: the limits.
+    """
+    first, *rest = reports
+    if not rest:
+        return first
+    shared = {reason for reason in first.reasons if all(reason in each.reasons for each in rest)}  # of missed seams, say
+    own = tuple(replace(each, phantom_seams=None, iou=None, unjudged=(), unplanned=(), others=()) for each in rest)
+    reasons: list[str] = []
+    passed = all(each.passed for each in reports)
+    for each in reports:
+        if each.passed == passed:
+            named = (reason if reason in shared else f"seam {each.seam}: {reason}" for reason in each.reasons)
+            reasons += [reason for reason in named if reason not in reasons]
+    stop = next((each for each in reports if each.stopped is not None), first)
+    whole = replace(
+        first,
+        passed=passed,
+        reasons=tuple(reasons),
+        others=own,
+        welded=sum(each.welded for each in reports),
+        stopped=stop.stopped,
+        progress=stop.progress,
+    )
+    return replace(whole, warnings=warnings(whole, checks(whole, config or ReportConfig())))
 
 
 def _against_known(
@@ -88,11 +133,13 @@ def _against_known(
     welded: int,
     trims: tuple[Metre, Metre],
     failures: list[str],
+    config: ReportConfig,
 ) -> WeldReport:
     """The report with the figures that need the true seams; seams that were missed, and a welded line that is a phantom or a
     piece of a seam, are added to `failures`."""
     match = match_seams(findings.seams, known)
-    failures += [f"known seam {known[j].name or j + 1} was not found" for j in match.missed]
+    lost = {i + 1: findings.seams[i] for i in match.phantoms}
+    failures += [miss(known[j], j + 1, lost) for j in match.missed]
     report = replace(report, phantom_seams=len(match.phantoms))
     path = paths[welded] if welded < len(paths) else None
     if path is None:
@@ -105,6 +152,8 @@ def _against_known(
     if welded in match.fragments:
         failures.append(f"seam {welded + 1}, the one judged, is a piece of known seam {partner.name or owner + 1}")
     seam = findings.seams[welded]
+    if clause := steady_offset(seam, partner, config.max):
+        failures.append(clause)
     return replace(
         report,
         plan=path_error(path, partner, seam, trims),
@@ -113,19 +162,23 @@ def _against_known(
     )
 
 
-def _against_plan(report: WeldReport, path: TorchPath, log: ExecutionLog, failures: list[str]) -> WeldReport:
+def _against_plan(report: WeldReport, path: TorchPath, log: ExecutionLog, failures: list[str], config: ReportConfig) -> WeldReport:
     """The report with the figures of the executed weld against its plan; an arc that never burned is a failure."""
     if not log.arc_on.any():
         failures.append("the arc never burned")
         return report
     tracking = tracking_error(log.X_BT_act.p[log.arc_on], path.X_BT.p[path.weld])
     speed = speed_error(log, path)
+    slowest, fastest, uneven = paces(log, path, config.stretch, config.pace)
     return replace(
         report,
         tracking_p95=tracking.p95,
         tracking_max=tracking.max,
         speed_error_p95=None if speed is None else speed.p95,
         speed_error_max=None if speed is None else speed.max,
+        slowest=slowest,
+        fastest=fastest,
+        uneven=uneven,
     )
 
 
@@ -155,7 +208,10 @@ def versions() -> dict[str, str]:
 def report_json(report: WeldReport, config: ReportConfig | None = None) -> dict[str, Any]:
     """The report as plain JSON values: SI figures as in `WeldReport`, and the checks in words beside their limits."""
     config = config or ReportConfig()
-    listed = [{"figure": c.figure, "value": c.value, "limit": c.limit, "passed": c.passed} for c in checks(report, config)]
+    listed = [
+        {"figure": c.figure, "value": c.value, "limit": c.limit, "passed": c.passed, "amber": c.amber or None}
+        for c in checks(report, config)
+    ]
     record = _plain(asdict(report))
     return {"schema": REPORT_SCHEMA, "units": {"length": "m", "angle": "rad", "time": "s"}, **record, "checks": listed}
 

@@ -108,17 +108,22 @@ class LimitsConfig:
         mean: cross-track distance from the known seam, mean [m].
         p95: the same, 95th percentile [m].
         max: the same, greatest [m].
+        ends: length that may be left unwelded at either end, or welded beyond it [m].
         least_speed: share of the asked welding speed to which joint limits may slow the weld in places: round an edge, say,
             where the wire swings from one face to the next.
+        reason: why, in a clause; a figure that keeps these limits and not the general ones is told in amber with it.
     """
 
     mean: Metre | None = None
     p95: Metre | None = None
     max: Metre | None = None
+    ends: Metre | None = None
     least_speed: float | None = None
+    reason: str | None = None
 
     def __post_init__(self) -> None:
-        require_within(self, {name: (0.0, 1.0) for name, value in vars(self).items() if value is not None}, "limits")
+        given = (name for name, value in vars(self).items() if value is not None and name != "reason")
+        require_within(self, dict.fromkeys(given, (0.0, 1.0)), "limits")
 
 
 @dataclass(frozen=True)

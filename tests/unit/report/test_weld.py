@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from tests.seams import findings, found_seam, sine_seam, torch_path, weld_log
+from weldsim.curves import arc_length
 from weldsim.records import WeldReport
 from weldsim.report.limits import ReportConfig, checks
-from weldsim.report.weld import report_json, weld_report
+from weldsim.report.verdict import AMBER, FAILED, PASSED, UNJUDGED, verdict
+from weldsim.report.weld import joined, report_json, weld_report
 
 
 def job(offset: float = 2e-4, seed: int = 0, *, factor: float = 1.0, side: float = 0.0, executed: bool = True) -> WeldReport:
@@ -66,9 +68,11 @@ def test_each_fault_is_named_with_value_and_limit(figure: str) -> None:
 
 def test_every_limit_decides_alone() -> None:
     report = job()
+    unlike = {"coverage": 1.1, "phantoms": -1, "least_speed": 1.1, "most_speed": 0.5}
     tight = {
-        field: -1.0 if field not in ("coverage", "phantoms") else {"coverage": 1.1, "phantoms": -1}[field]
+        field: unlike.get(field, -1.0)
         for field in ReportConfig.__dataclass_fields__
+        if field not in ("stretch", "pace", "reason")  # which say how, and why
     }
     names = set()
     for field, limit in tight.items():
@@ -140,3 +144,72 @@ def test_json_is_strict_and_complete() -> None:
     assert len(data["checks"]) == len(checks(report, ReportConfig()))
     assert set(WeldReport.__dataclass_fields__) <= set(data)
     assert "weldsim" in data["versions"]
+
+
+def ended(start: float, end: float, **limits: float) -> WeldReport:
+    """A weld that begins and ends so far beyond the known seam [m]; short of it where negative."""
+    known = sine_seam(np.random.default_rng(6))
+    keep = (known.s >= -start) & (known.s <= known.s[-1] + end)
+    seam = found_seam(known, np.zeros(len(known.s)), every=1)
+    s = known.s[keep] - known.s[keep][0]
+    points, more = seam.points_B[keep], {name: getattr(seam, name)[keep] for name in ("tangents_B", "normals_B")}
+    for beyond, place, where in ((start, 0, 0), (end, -1, len(s))):
+        if beyond > 0:
+            t = known.tangents_B[place] * (1 if place else -1)
+            points = np.insert(points, where, known.opening_B[place] + beyond * t, axis=0)
+            more = {name: np.insert(values, where, values[place], axis=0) for name, values in more.items()}
+    seam = replace(seam, points_B=points, s=arc_length(points), **more, left_B=None, right_B=None, sigma=None)
+    path, config = torch_path(seam), ReportConfig(**limits)
+    log = weld_log(path, np.random.default_rng(0))
+    return weld_report(findings((seam,), np.zeros(5, bool)), (path,), scene="x", log=log, known=(known,), config=config)
+
+
+@pytest.mark.parametrize(("start", "end"), [(-4e-3, 0.0), (0.0, -4e-3), (4e-3, 0.0), (0.0, 4e-3), (-4e-3, -4e-3)])
+def test_each_end_is_held_to_3_mm_short_and_beyond(start: float, end: float) -> None:
+    report = ended(start, end)
+    assert not report.passed
+    told = [f"{who}, {name} of the seam" for who in ("plan", "executed") for name, off in (("start", start), ("end", end)) if off]
+    assert [reason.partition("the seam")[0] + "the seam" for reason in report.reasons] == told
+    word = "short" if min(start, end) < 0 else "beyond"
+    assert all(f" mm {word} (limit <= 3 mm)" in reason for reason in report.reasons)
+    assert ended(start / 2, end / 2).passed
+    loose = ended(start, end, ends=6e-3)
+    assert loose.passed
+    assert len(loose.warnings) == len(told)  # a limit that is looser than the general one is told
+
+
+def test_the_headline_says_how_many_of_how_many_were_welded() -> None:
+    rng = np.random.default_rng(8)
+    known = tuple(replace(sine_seam(rng), name=f"branch {i + 1}") for i in range(3))
+    seams = tuple(found_seam(each, np.zeros(len(each.s))) for each in known)
+    paths = tuple(torch_path(seam) for seam in seams)
+    found = findings(seams, np.zeros(5, bool))
+
+    def report(i: int, factor: float = 1.0) -> WeldReport:
+        log = weld_log(paths[i], np.random.default_rng(0), factor=factor)
+        return weld_report(found, paths, scene="y", log=log, known=known, welded=i)
+
+    one = report(1)
+    assert one.warnings == ("1 of 3 seams welded",)
+    assert verdict(one, 3, ReportConfig()) == (AMBER, "1 of 3 seams welded; all 21 limits kept")
+    whole = joined((report(0), report(1), report(2)))
+    assert whole.warnings == ()
+    assert verdict(whole, 3, ReportConfig()) == (PASSED, "3 of 3 seams welded; all 61 limits kept")
+    assert sum(check.figure.startswith("seam 3: ") for check in checks(whole, ReportConfig())) > 10
+    two = joined((report(0), report(2)))
+    assert verdict(two, 3, ReportConfig())[1].startswith("2 of 3 seams welded")
+    bad = joined((report(0), report(1, factor=1.04), report(2)))
+    assert not bad.passed
+    assert [reason.partition(", p95")[0] for reason in bad.reasons] == ["seam 2: torch speed error"]
+    assert verdict(bad, 3, ReportConfig())[0] == FAILED
+
+
+def test_what_nothing_is_known_of_is_a_dash_and_not_judged() -> None:
+    known = sine_seam(np.random.default_rng(3))
+    seam = found_seam(known, np.zeros(len(known.s)))
+    why = (("phantom seams", "no seam is known"),)
+    report = weld_report(findings((seam,), np.zeros(5, bool)), (torch_path(seam),), scene="mine", unjudged=why)
+    assert report.passed
+    (row,) = checks(report, ReportConfig())
+    assert (row.figure, row.value, row.limit, row.passed) == ("phantom seams", "-", "no seam is known", None)
+    assert verdict(report, 1, ReportConfig()) == (UNJUDGED, "no known seam to compare with; 1 found")
