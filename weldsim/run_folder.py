@@ -1,6 +1,7 @@
 """The folder that a run leaves behind: whole or not at all, and never in place of something else."""
 
 import io
+import itertools
 import json
 import os
 import shutil
@@ -46,8 +47,17 @@ def check_run_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: holds something other than a run and is left alone; give another --out", path=str(folder))
 
 
-def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: SensorName) -> Path:
-    """The folder, in place of an earlier run's.
+def write_run(
+    folder: Path,
+    result: RunResult,
+    config: CellConfig,
+    scene: "SceneConfig",
+    seed: int,
+    sensor: SensorName,
+    *,
+    keep_earlier: bool = True,
+) -> Path | None:
+    """The folder, and where an earlier run that stood there is kept now; None where there was none, or none was to be kept.
 
     It holds config.json (resolved), path.json, path.csv, cloud.ply, a depth image with intrinsics and pose for each view,
     scan.npz where the arm was driven to them, views.json where there were several (how they were lined up), report.json,
@@ -56,11 +66,17 @@ def write_run(folder: Path, result: RunResult, config: CellConfig, scene: "Scene
     Raises:
         OutputError: it cannot be written; nothing is left then.
     """
-    return folder_in_place(folder, lambda place: _fill(place, result, config, scene, seed, sensor))
+    return folder_in_place(folder, lambda place: _fill(place, result, config, scene, seed, sensor), keep_earlier=keep_earlier)
 
 
-def folder_in_place(folder: Path, fill: Callable[[Path], None]) -> Path:
-    """`folder`, with what `fill` writes into a folder beside it that is then renamed; an earlier run there is replaced.
+def folder_in_place(folder: Path, fill: Callable[[Path], None], *, keep_earlier: bool = True) -> Path | None:
+    """`folder`, with what `fill` writes into a folder beside it that is then renamed.
+
+    Args:
+        folder: an earlier run there is renamed to FOLDER.1, FOLDER.2, ... first.  fill: writes into the folder it is given.
+        keep_earlier: whether that is kept, or replaced.
+    Returns:
+        Where the earlier run is kept now; None where there was none or it was replaced.
 
     Raises:
         OutputError: it cannot be written, or holds something other than a run; nothing is left then.
@@ -70,12 +86,11 @@ def folder_in_place(folder: Path, fill: Callable[[Path], None]) -> Path:
     try:
         temporary.mkdir(parents=True)
         fill(temporary)
-        _put_in_place(temporary, folder)
+        return _put_in_place(temporary, folder, keep_earlier=keep_earlier)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error.strerror or error})", path=str(folder)) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return folder
 
 
 def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: SensorName) -> None:
@@ -145,19 +160,27 @@ def log_bytes(log: ExecutionLog) -> bytes:
     return buffer.getvalue()
 
 
-def _put_in_place(new: Path, folder: Path) -> None:
-    """`new` renamed to `folder`; an earlier run there is moved aside first and then removed."""
-    if not folder.exists():
+def _put_in_place(new: Path, folder: Path, *, keep_earlier: bool) -> Path | None:
+    """`new` renamed to `folder`; an earlier run there is moved aside first, and then removed or told where it is."""
+    if not folder.exists() or not any(folder.iterdir()):
         os.replace(new, folder)
-        return
-    old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
+        return None
+    old = _aside(folder) if keep_earlier else folder.with_name(f".{folder.name}.{os.getpid()}.old")
     os.replace(folder, old)
     try:
         os.replace(new, folder)
     except OSError:
         os.replace(old, folder)
         raise
+    if keep_earlier:
+        return old
     shutil.rmtree(old, ignore_errors=True)
+    return None
+
+
+def _aside(folder: Path) -> Path:
+    """The first of FOLDER.1, FOLDER.2, ... that is free."""
+    return next(place for n in itertools.count(1) if not os.path.lexists(place := folder.with_name(f"{folder.name}.{n}")))
 
 
 def _is_run(folder: Path) -> bool:

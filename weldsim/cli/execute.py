@@ -1,5 +1,6 @@
 """`weldsim execute`."""
 
+import re
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -7,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from weldsim import units
 from weldsim.cli.dry_run import failures
 from weldsim.cli.options import ConfigOptions
 from weldsim.cli.outputs import check_folder, nearest_folder
-from weldsim.cli.show import check_rows, print_json, progress, table, times
+from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
 from weldsim.cli.signals import INTERRUPTED, interrupted_once
 from weldsim.errors import InputError
+from weldsim.report.verdict import progress_text, stopped_at
 
 if TYPE_CHECKING:
     from weldsim.config import CellConfig
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from weldsim.records import ExecutionLog
     from weldsim.welding.job import Job, JobConfig
 
+FROM = re.compile(r"-from-\d+$")  # what a directory of the rest of a weld ends in
 MARKS = {True: "ok", False: "FAIL", None: "-"}
 
 
@@ -55,8 +59,12 @@ class Execute(ConfigOptions):
     seam: int = 1
     """Which seam of the file, counted from 1."""
 
+    from_: Annotated[str | None, tyro.conf.arg(name="from", metavar="LENGTH")] = None
+    """Go on with a weld that was stopped: up to where the seam is welded, "69 mm" say, as the report of the stop tells. The last
+    `execution.overlap` before it is welded once more."""
+
     out: Path | None = None
-    """The run directory; runs/FILE-ROBOT by default."""
+    """The run directory; runs/FILE-ROBOT by default. An earlier run there is kept, as NAME.1."""
 
     def __call__(self) -> int:
         """0 where the weld was made within every limit, else 1."""
@@ -71,9 +79,14 @@ class Execute(ConfigOptions):
             seam=self.seam - 1,
             arc=self.arc,
             speed_scale=self.speed_scale,
+            start=None if self.from_ is None else along_seam(self.from_),
             black_boxes=folder.with_name(f"{folder.name}.black-box"),
         )
         program = self._program(config)
+        if job.start is not None:
+            from weldsim.welding.rest import rest_of
+
+            rest_of(program.paths[job.seam], job.start, config.execution.overlap, program.names[job.seam])
 
         from weldsim.clock import Clock
         from weldsim.config import paced_for
@@ -89,13 +102,16 @@ class Execute(ConfigOptions):
             robot = self._robot(config, cell)
             with interrupted_once():
                 done = weld(program, findings, robot, cell, config, job, scene=scene, known=known, clock=clock)
+            if done.report is not None and done.stopped is not None:
+                done = replace(done, report=replace(done.report, way_on=self._way_on(done, folder)))
             tell("writing", None)
-            write_job(folder, self.file, program, findings, cloud, done, job, config, cell.name, scene, known)
+            kept = write_job(folder, self.file, program, findings, cloud, done, job, config, cell.name, scene, known)
         written = [folder, *([done.black_box] if done.black_box is not None else [])]
         if self.json:
-            print_json({**job_document(done, program, job, config, cell.name, scene), "written": [str(path) for path in written]})
+            document = job_document(done, program, job, config, cell.name, scene)
+            print_json({**document, **written_json(written, kept)})
         else:
-            self._print(done, program, job, config, scene, written)
+            self._print(done, program, job, config, scene, written, kept)
         if done.interrupted:
             return INTERRUPTED
         return 0 if done.passed else 1
@@ -141,7 +157,14 @@ class Execute(ConfigOptions):
         return UrRobot(ur if self.host is None else replace(ur, host=self.host))
 
     def _print(
-        self, done: "Job", program: "Program", job: "JobConfig", config: "CellConfig", scene: Any, written: list[Path]
+        self,
+        done: "Job",
+        program: "Program",
+        job: "JobConfig",
+        config: "CellConfig",
+        scene: Any,
+        written: list[Path],
+        kept: Path | None,
     ) -> None:
         name = program.names[job.seam]
         print(f"{program.source}, {name}, on {done.robot}: {_word(done)}")
@@ -152,12 +175,14 @@ class Execute(ConfigOptions):
         rows = [[c.name, c.value, c.expected, MARKS[c.passed], c.advice if c.passed is False else ""] for c in done.clauses]
         print(table(rows, ("contract", "robot", "expected", "", "")))
         if done.trial is not None and not done.trial.passed:
-            print(
-                f"  nothing has moved: a dry run from where the arm stands fails; {self._dry_run(done, written[0])} looks for a fix"
-            )
+            looks = "" if self.from_ is not None else f"; {self._dry_run(done, written[0])} looks for a fix"  # along the whole seam
+            print(f"  nothing has moved: a dry run from where the arm stands fails{looks}")
             print(table(failures(done.trial), ("waypoint", "s", "verdict", "reason")))
         if done.stopped is not None:
             print(f"  {'stopped' if done.moved else 'nothing has moved'}: {done.stopped}")
+        if done.report is not None and done.stopped is not None:
+            print(f"  stopped {stopped_at(done.report)}")
+            print(f"  {done.report.way_on}")
         if done.report is not None:
             from weldsim.config import limits_for
             from weldsim.report.limits import checks
@@ -172,22 +197,60 @@ class Execute(ConfigOptions):
                 print(f"  amber: {warning}")
         if done.log is not None:
             pace = "" if job.speed_scale == 1 else f" at {100 * job.speed_scale:g} % of the pace"
-            print(f"  arc {_arc(done.log, job)}; {done.log.t[-1] - done.log.t[0]:.1f} s{pace}")
+            far = f"; {progress_text(done.report)}" if done.report is not None and done.stopped is None else ""
+            print(f"  arc {_arc(done.log, job)}{far}; {done.log.t[-1] - done.log.t[0]:.1f} s{pace}")
         print(times(done.timing))
-        for path in written:
-            print(f"  wrote {path}")
+        print_written(written, kept)
+
+    def _way_on(self, done: "Job", folder: Path) -> str:
+        """How to go on with a weld that was stopped: the command, or that nothing is left. Args: folder, its run directory."""
+        from weldsim.welding.rest import SHORTEST
+
+        far = done.progress
+        if far is None:
+            return ""
+        left = float(done.path.s[done.path.weld][-1]) - far.s_to
+        if left < SHORTEST:
+            return f"{units.to_mm(left):.1f} mm of the seam are left, too little to go on with"
+        words = ["weldsim", "execute", str(self.file), "--robot", self.robot]
+        words += [] if self.host is None else ["--host", self.host]
+        words += [] if self.scene is None else ["--scene", self.scene]
+        words += ["--arc"] if self.arc else []
+        words += [] if self.speed_scale == 1 else ["--speed-scale", f"{self.speed_scale:g}"]
+        words += [] if self.seam == 1 else ["--seam", str(self.seam)]
+        words += self._settings()
+        if far.welded > 0:
+            whole_tenths = int(far.s_to * 1e4 + 1e-6)  # rounded up, a gap would be left
+            words += ["--from", f"{whole_tenths / 10:g} mm"]
+            words += ["--out", str(folder.with_name(f"{FROM.sub('', folder.name)}-from-{far.s_to * 1e3:.0f}"))]
+            return f"to go on from there: {shlex.join(words)}"
+        words += [] if self.from_ is None else ["--from", self.from_]
+        words += ["--out", str(folder)]
+        return f"nothing of it is welded; to weld it: {shlex.join(words)}"
+
+    def _settings(self) -> list[str]:
+        """The options that repeat this command's settings."""
+        given = [] if self.config is None else ["--config", str(self.config)]
+        return given + [word for text in self.set for word in ("--set", text)]
 
     def _dry_run(self, done: "Job", folder: Path) -> str:
         """The command that repeats a job's dry run. Args: folder, its run directory."""
         from weldsim.execution.contract import own_arm
 
         scene = [] if self.scene is None else ["--scene", self.scene]
-        settings = [] if self.config is None else ["--config", str(self.config)]
-        settings += [word for text in self.set for word in ("--set", text)]
         start = [] if done.q_start is None else ["--start", ", ".join(f"{angle:.4f}" for angle in done.q_start)]
         own = done.facts is not None and not own_arm(done.facts).nominal
         arm = ["--arm", str(folder / "contract.json")] if own else []
-        return shlex.join(["weldsim", "dry-run", str(self.file), *scene, *arm, *settings, *start])
+        return shlex.join(["weldsim", "dry-run", str(self.file), *scene, *arm, *self._settings(), *start])
+
+
+def along_seam(text: str) -> float:
+    """A length along a seam [m] from text such as "69 mm". Raises InputError where it has no unit, ConfigError for another."""
+    try:
+        float(text)
+    except ValueError:
+        return units.parse(text, "m", where="--from")
+    raise InputError(f'--from {text}: a length along the seam with its unit is needed, "{text} mm" say', value=text)
 
 
 def _arc(log: "ExecutionLog", job: "JobConfig") -> str:

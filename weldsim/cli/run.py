@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
-from weldsim.cli.show import check_rows, print_json, progress, table, times
+from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
 from weldsim.errors import InputError, SensorError
 from weldsim.sensor.choose import SensorName
 
@@ -44,7 +44,7 @@ class Run(ConfigOptions):
     """Where to write a film of the weld, MP4."""
 
     out: Path | None = None
-    """The run directory; runs/SCENE-SEED by default."""
+    """The run directory; runs/SCENE-SEED by default. An earlier run there is kept, as NAME.1."""
 
     def __call__(self) -> int:
         """0 where the verdict is passed, else 1."""
@@ -77,14 +77,14 @@ class Run(ConfigOptions):
                 tell=tell,
             )
             tell("writing", None)
-            write_run(folder, result, config, scene, self.seed, self.sensor)
+            kept = write_run(folder, result, config, scene, self.seed, self.sensor)
         written = [folder, *([self.video] if self.video is not None and result.log is not None else [])]
         limits = limits_for(config, scene)
         if self.json:
-            self._print_json(result.report, limits, written)
+            self._print_json(result.report, limits, written, kept)
         else:
-            notes = (*result.world.workpiece.notes, *(result.motion.notes if result.motion else ()))
-            self._print(result.report, limits, len(result.plan.findings.seams), written, notes)
+            self._print(result.report, limits, len(result.plan.findings.seams), (*result.world.workpiece.notes, *(result.motion.notes if result.motion else ())))
+            print_written(written, kept)
         return 0 if result.report.passed else 1
 
     def scene_config(self) -> Any:
@@ -102,12 +102,12 @@ class Run(ConfigOptions):
             raise InputError(f"--out {folder}: give the run directory a name of its own", path=str(folder))
         check_folder(nearest_folder(folder), folder)
 
-    def _print_json(self, report: "WeldReport", limits: "ReportConfig", written: list[Path]) -> None:
+    def _print_json(self, report: "WeldReport", limits: "ReportConfig", written: list[Path], kept: Path | None) -> None:
         from weldsim.report.weld import report_json
 
-        print_json({**report_json(report, limits), "written": [str(path) for path in written]})
+        print_json({**report_json(report, limits), **written_json(written, kept)})
 
-    def _print(self, report: "WeldReport", limits: "ReportConfig", found: int, written: list[Path], notes: tuple[str, ...]) -> None:
+    def _print(self, report: "WeldReport", limits: "ReportConfig", found: int, notes: tuple[str, ...]) -> None:
         from weldsim.report.limits import checks
         from weldsim.report.verdict import verdict
 
@@ -121,5 +121,3 @@ class Run(ConfigOptions):
         for note in notes:
             print(f"  {note}")
         print(times(report.timing))
-        for path in written:
-            print(f"  wrote {path}")

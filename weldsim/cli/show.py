@@ -5,6 +5,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -39,6 +40,19 @@ def times(seconds: dict[str, float]) -> str:
 def print_json(content: dict[str, Any]) -> None:
     """One object on stdout."""
     print(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def print_written(written: Sequence[Path], kept: Path | None = None) -> None:
+    """A line for each file or folder that was written, the run directory first, and for the earlier run that stood there."""
+    for path in written:
+        print(f"  wrote {path}")
+    if kept is not None:
+        print(f"  the run that was in {written[0]} is now {kept}")
+
+
+def written_json(written: Sequence[Path], kept: Path | None) -> dict[str, Any]:
+    """The same as JSON values."""
+    return {"written": [str(path) for path in written], "kept": None if kept is None else str(kept)}
 
 
 @contextmanager

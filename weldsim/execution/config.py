@@ -9,6 +9,7 @@ from weldsim.quantity import Metre, MetrePerSecond, Radian, RadianPerSecond, Sec
 RANGES = {
     "settle": (0.0, 60.0),
     "blend": (1e-3, 10.0),
+    "overlap": (0.0, 0.1),
 }
 GATE_RANGES = {
     "start_tolerance": (1e-6, 0.1),
@@ -152,6 +153,8 @@ class ExecutionConfig:
     """Time the last point is held, so that the log ends with the arm at rest."""
     blend: Second = 0.5
     """Time in which a trajectory takes over from where the arm really stands."""
+    overlap: Metre = 0.005
+    """Length of seam that is welded once more where a stopped weld is gone on with (`weldsim execute --from`)."""
     gate: GateConfig = field(default_factory=GateConfig)
     """What no command and no arm may do."""
     contract: ContractConfig = field(default_factory=ContractConfig)

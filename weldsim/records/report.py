@@ -82,7 +82,7 @@ class WeldReport:
         unjudged: figures that nothing is known to judge by, and why.
         seam: number of the seam that the figures are of, from 1.  welded, seams: how many were welded, of how many there are.
         others: the same of the other seams of the job, without what is said of all of them together.
-        stopped: why the arm was stopped before the end, or None.  progress: how far it came.
+        stopped: why the arm was stopped before the end, or None.  progress: how far it came.  way_on: how to go on, in words.
         timing: seconds a stage.  seed, config_digest, versions: what it ran with.
     """
 
@@ -111,6 +111,7 @@ class WeldReport:
     others: "tuple[WeldReport, ...]" = ()
     stopped: str | None = None
     progress: WeldProgress | None = None
+    way_on: str = ""
     timing: dict[str, float] = field(default_factory=dict)
     seed: int = 0
     config_digest: str = ""

@@ -128,7 +128,7 @@ def _planned(task: Task, method: str, seen: Sighting) -> Row:
     folder = picture = None
     if deviations and task.keep is not None:
         folder = task.keep / f"{task.scene.name}-{method}-{task.seed}"
-        write_run(folder, done, config, task.scene, task.seed, seen.sensor)
+        write_run(folder, done, config, task.scene, task.seed, seen.sensor, keep_earlier=False)
     if task.pictures:
         picture = _picture(done)
     judged = any(entry.judges(task.seed) for entry in entries.values())

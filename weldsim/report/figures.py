@@ -12,7 +12,7 @@ from numpy import ndarray
 from weldsim import units
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindings, TorchPath
 from weldsim.report.limits import ReportConfig
-from weldsim.report.style import CENTRE, GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
+from weldsim.report.style import BAD, CENTRE, GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
 from weldsim.report.view import CrossSection, ErrorLine, height_range, heights, shown, shows_surface, torch_axes, view_frame
 
@@ -28,8 +28,9 @@ def scene(
     paths: tuple[TorchPath | None, ...],
     log: ExecutionLog | None,
     known: tuple[KnownSeam, ...],
+    stopped_B: tuple[float, float, float] | None = None,
 ) -> Figure:
-    """Cloud, groove region, lips, centre lines, torch path and wires in the robot base."""
+    """Cloud, groove region, lips, centre lines, torch path and wires in the robot base; where a weld was stopped [m]."""
     X_BS = view_frame(cloud, findings.seams)
     index = shown(cloud, findings.seams, CLOUD_LIMIT)
     inside = findings.region[index] > 0 if len(findings.region) == len(cloud) else np.zeros(len(index), bool)
@@ -56,6 +57,8 @@ def scene(
     data += [_line("known seam", k.opening_B, KNOWN, 4, legend=i == 0) for i, k in enumerate(known)]
     if log is not None and log.arc_on.any():
         data.append(_line("executed tip", _thin(log.X_BT_act.p[log.arc_on]), LINES["executed"], 3))
+    if stopped_B is not None:
+        data.append(_dots("stopped here", np.array([stopped_B]), {"size": 9, "color": BAD, "symbol": "x"}) | {"showlegend": True})
     eye = 0.9 * X_BS.R[:, 2] - 0.75 * X_BS.R[:, 1]
     axis = {"backgroundcolor": "#f7f9fa", "gridcolor": GRID, "showbackground": True, "color": SOFT, "tickfont": {"size": 10}}
     axis |= {"zeroline": False, "showspikes": False}
@@ -161,8 +164,11 @@ def errors_distance(lines: dict[str, ErrorLine], config: ReportConfig) -> Figure
     return {"data": data, "layout": layout}
 
 
-def torch_speed(log: ExecutionLog, path: TorchPath, config: ReportConfig) -> Figure | None:
-    """Measured torch speed along the weld beside the planned one with its tolerance; None for a weld too short to judge."""
+def torch_speed(log: ExecutionLog, path: TorchPath, config: ReportConfig, stopped: float | None = None) -> Figure | None:
+    """Measured torch speed along the weld beside the planned one with its tolerance; None for a weld too short to judge.
+
+    A weld that was stopped has a mark at the arc length where [m], and the rest of its path in sight.
+    """
     speed = speed_error(log, path)
     if speed is None:
         return None
@@ -175,6 +181,15 @@ def torch_speed(log: ExecutionLog, path: TorchPath, config: ReportConfig) -> Fig
     ]
     layout = _layout("along the path [mm]", "torch speed [mm/s]")
     layout["yaxis"]["rangemode"] = "tozero"
+    if stopped is not None:
+        x = units.to_mm(stopped)
+        mark = {"type": "line", "xref": "x", "yref": "paper", "x0": x, "x1": x, "y0": 0, "y1": 1}
+        layout["shapes"] = [{**mark, "line": {"color": BAD, "width": 2, "dash": "dash"}}]
+        layout["annotations"] = [
+            {"x": x, "y": 1, "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False}
+            | {"text": f"stopped at {x:.1f} mm", "font": {"size": 12, "color": BAD}}
+        ]
+        layout["xaxis"]["range"] = [units.to_mm(float(path.s[0])), units.to_mm(float(path.s[-1]))]
     return {"data": data, "layout": layout}
 
 

@@ -10,7 +10,7 @@ from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
 from weldsim.report import figures
 from weldsim.report.limits import Check, ReportConfig, checks
-from weldsim.report.verdict import look, verdict
+from weldsim.report.verdict import look, stopped_place, verdict
 from weldsim.report.view import cross_section, error_lines, shows_surface
 
 STYLE = """
@@ -74,8 +74,11 @@ def write_html(
     config = config or ReportConfig()
     drawn: list[figures.Figure] = []
     body = [_header(report, findings, config), _cards(report, findings), _checks(checks(report, config))]
-    body.append(_figure(drawn, "Cloud, seam and torch path", figures.scene(cloud, findings, paths, log, known)))
-    plots = _plots(drawn, cloud, findings, paths, log, known, welded, joint_names, config)
+    body.append(
+        _figure(drawn, "Cloud, seam and torch path", figures.scene(cloud, findings, paths, log, known, stopped_place(report)))
+    )
+    stopped = None if report.stopped is None or report.progress is None else report.progress.s_to
+    plots = _plots(drawn, cloud, findings, paths, log, known, welded, joint_names, config, stopped)
     body.append(f'<div class="two">{"".join(plots)}</div>')
     body.append(f'<div class="two">{_seams(findings)}{_refused(findings)}{_threshold(findings.threshold)}{_timing(report)}</div>')
     body.append(_footer(report))
@@ -103,8 +106,9 @@ def _plots(
     welded: int,
     joint_names: tuple[str, ...],
     config: ReportConfig,
+    stopped: float | None,
 ) -> list[str]:
-    """The two-column figures that there is data for."""
+    """The two-column figures that there is data for. Args: stopped, at which arc length [m], None where it was not."""
     out = []
     lines = error_lines(findings, paths, log, known, welded)
     if lines:
@@ -118,7 +122,7 @@ def _plots(
             out.append(_figure(drawn, "Standard deviation and width along the seam", figures.uncertainty(seam)))
     path = paths[welded] if welded < len(paths) else None
     if log is not None and path is not None:
-        speed = figures.torch_speed(log, path, config)
+        speed = figures.torch_speed(log, path, config, stopped)
         if speed is not None:
             out.append(_figure(drawn, "Torch speed", speed))
         out.append(_figure(drawn, "Joint angles", figures.joints(log, "q", joint_names)))
@@ -138,7 +142,8 @@ def _figure(drawn: list[figures.Figure], title: str, figure: figures.Figure) -> 
 def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) -> str:
     word, why = verdict(report, len(findings.seams), config)
     listed = "" if report.passed else "".join(f"<li>{escape(reason)}</li>" for reason in report.reasons)
-    listed += "".join(f"<li>{escape(clause)}</li>" for clause in (*report.warnings, *report.unplanned))
+    on = (report.way_on,) if report.way_on else ()
+    listed += "".join(f"<li>{escape(clause)}</li>" for clause in (*on, *report.warnings, *report.unplanned))
     facts = f"{why}; method {report.method}, seed {report.seed}"
     return (
         f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"

@@ -21,7 +21,7 @@ from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, T
 from weldsim.report.limits import ReportConfig
 from weldsim.report.style import AMBER, BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
-from weldsim.report.verdict import look, verdict
+from weldsim.report.verdict import look, stopped_place, verdict
 from weldsim.report.view import (
     MARGIN,
     CrossSection,
@@ -59,7 +59,10 @@ def write_png(
     grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, top=0.86, bottom=0.08, width_ratios=(1.75, 1), hspace=0.34, wspace=0.16)
     _headline(figure, report, findings, config or ReportConfig())
     surface = shows_surface(cloud, findings.seams)
-    _plan_view(figure, figure.add_subplot(grid[:, 0]), cloud, findings, paths, surface=surface)
+    plan = figure.add_subplot(grid[:, 0])
+    _plan_view(figure, plan, cloud, findings, paths, surface=surface)
+    if (place := stopped_place(report)) is not None and report.progress is not None:
+        _stop(plan, view_frame(cloud, findings.seams).inverse(), np.array(place), report.progress.s_to)
     upper, lower = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
     if findings.seams:
         if surface:
@@ -169,6 +172,15 @@ def _window(points_S: ndarray, seams_S: list[ndarray]) -> ndarray:
     width = max(size[0], size[1] / RATIO)
     half = np.array([width, RATIO * width]) / 2
     return np.stack([(low + high) / 2 - half, (low + high) / 2 + half])
+
+
+def _stop(axes: Axes, X_SB: Transform, place_B: ndarray, s: float) -> None:
+    """A cross where a weld was stopped, with its arc length [m]."""
+    x, y, _ = 1e3 * X_SB.points(place_B[None])[0]
+    axes.plot([x], [y], "x", color=BAD, ms=15, mew=4, zorder=6)
+    text = f"stopped at {units.to_mm(s):.1f} mm"
+    style = {"boxstyle": "round,pad=0.25", "fc": "white", "ec": BAD}
+    axes.annotate(text, (x, y), xytext=(10, -26), textcoords="offset points", color=BAD, weight="bold", fontsize=12, bbox=style)
 
 
 def _number(axes: Axes, X_SB: Transform, points_B: ndarray, text: str) -> None:

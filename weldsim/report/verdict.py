@@ -40,7 +40,8 @@ def look(word: str) -> Look:
 
 def seams_welded(report: WeldReport) -> str:
     """ "1 of 3 seams welded"."""
-    return f"{report.welded} of {report.seams} seams welded"
+    lit = report.progress is None or report.progress.arc
+    return f"{report.welded} of {report.seams} seams {'welded' if lit else 'travelled with the arc off'}"
 
 
 def warnings(report: WeldReport, listed: tuple[Check, ...]) -> tuple[str, ...]:
@@ -71,6 +72,11 @@ def stopped_at(report: WeldReport) -> str:
     if done.welded <= 0:
         return f"before the weld began: 0 of {length:.0f} mm {'welded' if done.arc else 'travelled'}"
     return f"at s = {s:.1f} mm: {progress_text(report)}"
+
+
+def stopped_place(report: WeldReport) -> tuple[float, float, float] | None:
+    """Where on the seam the torch was stopped, in B [m]; None where it was not."""
+    return None if report.stopped is None or report.progress is None else report.progress.position_B
 
 
 def progress_text(report: WeldReport) -> str:

@@ -38,10 +38,12 @@ def write_job(
     cell: str,
     scene: "SceneConfig | None" = None,
     known: tuple[KnownSeam, ...] | None = None,
-) -> Path:
-    """The folder, in place of an earlier run's: config.json, the path file, contract.json, dry_run.json, and where the arm was
-    moved log.npz, report.json, report.html, report.png; run.json says what is what.
+) -> Path | None:
+    """The folder: config.json, the path file, contract.json, dry_run.json, and where the arm was moved log.npz, report.json,
+    report.html, report.png; run.json says what is what.
 
+    Returns:
+        Where an earlier run that stood there is kept now; None where there was none.
     Raises:
         OutputError: it cannot be written; nothing is left then.
     """
@@ -59,7 +61,7 @@ def write_job(
             write_whole(place / "log.npz", log_bytes(done.log))
             write_json(place / "report.json", report_json(done.report, limits))
             paths = tuple(done.path if i == job.seam else each for i, each in enumerate(program.paths))
-            shown = {"log": judged(done.log), "known": known or (), "welded": job.seam, "config": limits}
+            shown = {"log": done.log if job.arc else judged(done.log), "known": known or (), "welded": job.seam, "config": limits}
             write_html(place / "report.html", done.report, cloud, findings, paths, **shown)
             write_png(place / "report.png", done.report, cloud, findings, paths, **shown)
         write_json(
@@ -72,6 +74,7 @@ def write_job(
                 "passed": done.passed,
                 "moved": done.moved,
                 "stopped": None if done.stopped is None else str(done.stopped),
+                "progress": progress_json(done),
                 "black_box": None if done.black_box is None else done.black_box.name,
                 "config_digest": digest(config),
                 "versions": versions(),
@@ -83,7 +86,14 @@ def write_job(
 
 
 def job_json(job: JobConfig) -> dict[str, Any]:
-    return {"seam": job.seam + 1, "arc": job.arc, "speed_scale": job.speed_scale}
+    return {"seam": job.seam + 1, "arc": job.arc, "speed_scale": job.speed_scale, "from": job.start}
+
+
+def progress_json(done: Job) -> dict[str, Any] | None:
+    """How far the weld came [m], and the command that goes on with it; None where nothing was moved."""
+    if done.progress is None:
+        return None
+    return {**asdict(done.progress), "way_on": done.report.way_on or None if done.report is not None else None}
 
 
 def contract_json(clauses: tuple[Clause, ...], facts: RobotFacts | None) -> dict[str, Any]:
@@ -140,6 +150,7 @@ def job_document(
         "passed": done.passed,
         "moved": done.moved,
         "stopped": None if stopped is None else {"text": str(stopped), **json.loads(json.dumps(data, default=str))},
+        "progress": progress_json(done),
         "black_box": None if done.black_box is None else str(done.black_box),
         "contract": contract_json(done.clauses, done.facts),
         "dry_run": dry,

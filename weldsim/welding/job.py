@@ -20,9 +20,12 @@ from weldsim.execution.resample import LEAST_SCALE, at_period, slowed
 from weldsim.execution.robot import Robot
 from weldsim.execution.runner import execute
 from weldsim.path.asked import leaned, wire_tip
-from weldsim.records import ExecutionLog, KnownSeam, RobotFacts, SeamFindings, Segment, TorchPath, WeldReport
+from weldsim.quantity import Metre
+from weldsim.records import ExecutionLog, KnownSeam, RobotFacts, SeamFindings, Segment, TorchPath, WeldProgress, WeldReport
+from weldsim.report.progress import weld_progress
 from weldsim.report.weld import weld_report
 from weldsim.scene.config import SceneConfig
+from weldsim.welding.rest import rest_of
 
 INTERRUPT = "interrupt"  # the rule that a stop by Ctrl-C is told under
 
@@ -33,12 +36,14 @@ class JobConfig:
 
     Attributes:
         seam: which path of the program, from 0.  arc: whether the arc may burn.  speed_scale: share of the planned pace.
+        start: arc length up to where the seam is welded already [m], None for a weld from its beginning.
         black_boxes: folder for what the gate leaves behind at a stop.
     """
 
     seam: int = 0
     arc: bool = False
     speed_scale: float = 1.0
+    start: Metre | None = None
     black_boxes: Path | None = None
 
     def __post_init__(self) -> None:
@@ -55,7 +60,7 @@ class Job:
         q_start: where the robot stood [rad], and trial: the dry run from there; None where the contract was broken.
         log: what the arm did, None where it was not moved.  report: its figures.
         stopped: why the robot was refused or stopped, or None.  black_box: where it was written, or None.
-        path: as it was welded.  timing: seconds a stage.
+        path: as it was welded.  progress: how far, None where it was not moved.  timing: seconds a stage.
     """
 
     robot: str
@@ -69,6 +74,7 @@ class Job:
     black_box: Path | None
     path: TorchPath
     timing: dict[str, float]
+    progress: WeldProgress | None = None
 
     @property
     def moved(self) -> bool:
@@ -111,13 +117,15 @@ def weld(
         scene, known: the scene and its known seams, where it is one of the twin.
         clock: takes the times.
     Raises:
-        InputError: a seam that the program does not have.
+        InputError: a seam that the program does not have, or a start that is not on it.
         ExecutionError: the robot cannot be connected.
     """
     clock = clock or Clock()
     if not 0 <= job.seam < len(program.paths):
         raise InputError(f"seam {job.seam + 1}: {program.source} has {len(program.paths)}, counted from 1", seam=job.seam + 1)
-    path = program.paths[job.seam]
+    path = whole = program.paths[job.seam]
+    if job.start is not None:
+        path = rest_of(whole, job.start, config.execution.overlap, program.names[job.seam])
     facts: RobotFacts | None = None
     clauses: tuple[Clause, ...] = ()
     q_start, trial, log, stopped = None, None, None, None
@@ -148,10 +156,13 @@ def weld(
     finally:
         gate.disconnect()
     path = replace(path, speed=path.speed * job.speed_scale)
-    report = None
+    report = progress = None
     if log is not None:
         with clock.stage("report"):
-            report = job_report(program, findings, path, log, config, job, scene=scene, known=known, stopped=stopped)
+            progress = weld_progress(log, path, whole, arc=job.arc)
+            report = job_report(
+                program, findings, path, log, config, job, scene=scene, known=known, stopped=stopped, progress=progress
+            )
         report = replace(report, timing=dict(clock.seconds))
     return Job(
         robot=gate.name,
@@ -165,11 +176,12 @@ def weld(
         black_box=gate.black_box,
         path=path,
         timing=dict(clock.seconds),
+        progress=progress,
     )
 
 
 def judged(log: ExecutionLog) -> ExecutionLog:
-    """The log with the whole weld as if the arc had burnt: what a job without the arc is judged by."""
+    """The log with the whole weld as if the arc had burnt: what a job that was not to light the arc is judged by."""
     return log if log.arc_on.any() else replace(log, arc_on=np.array([segment == Segment.WELD for segment in log.segments]))
 
 
@@ -184,10 +196,12 @@ def job_report(
     scene: SceneConfig | None,
     known: tuple[KnownSeam, ...] | None,
     stopped: ExecutionError | None,
+    progress: WeldProgress | None = None,
 ) -> WeldReport:
     """The report of `weldsim run` on what was executed; a stop fails it, whatever its figures."""
     paths = tuple(path if i == job.seam else each for i, each in enumerate(program.paths))
-    log = judged(log) if stopped is None else log
+    log = log if job.arc else judged(log)
+    left_out = float(path.s[path.weld][0] - program.paths[job.seam].s[0])
     report = weld_report(
         findings,
         tuple(replace(each, X_BT=wire_tip(each.X_BT, config.path)) for each in paths),
@@ -195,10 +209,14 @@ def job_report(
         log=replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
         known=None if known is None else tuple(leaned(seam, path, config.path) for seam in known),
         welded=job.seam,
-        trims=(config.path.start_trim, config.path.end_trim),
+        trims=(config.path.start_trim + left_out, config.path.end_trim),
+        stopped=None if stopped is None else str(stopped),
+        progress=progress,
         config_digest=digest(config),
         config=limits_for(config, scene),
     )
-    if stopped is None:
-        return report
-    return replace(report, passed=False, reasons=(str(stopped), *(report.reasons if not report.passed else ())))
+    if job.arc and job.speed_scale != 1 and log.arc_on.any():
+        more = f"{1 / job.speed_scale:.3g} times the metal for each millimetre"
+        pace = f"welded at {100 * job.speed_scale:g} % of the path's pace: {more}"
+        report = replace(report, warnings=(*report.warnings, pace))
+    return report
