@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from weldsim.cloud.register import Registration
 from weldsim.curves import project
-from weldsim.errors import InputError, PathError
+from weldsim.errors import ExecutionError, InputError, PathError
 from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
 from weldsim.sensor.choose import SensorName
 
@@ -59,10 +59,22 @@ class PlanResult:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Weld:
+    """One seam of a job that was begun. Attributes: seam, its index; path; motion; log, what the arm did; error, why it was
+    stopped before the end, or None."""
+
+    seam: int
+    path: TorchPath
+    motion: "MotionPlan"
+    log: ExecutionLog
+    error: ExecutionError | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RunResult:
     """A whole job on the twin. Attributes: world; captures, one a view; registration, how they were lined up, None for one;
-    tour, how the arm was driven to them, None where it was put there; plan; welded, the index of the seam that was welded;
-    motion and log, None where there was nothing to weld; report."""
+    tour, how the arm was driven to them, None where it was put there; plan; welded, the index of the seam that was welded, the
+    first of several; motion and log, None where there was nothing to weld; others, the welds after that; report."""
 
     world: "World"
     captures: tuple["Capture", ...]
@@ -73,6 +85,7 @@ class RunResult:
     motion: "MotionPlan | None"
     log: ExecutionLog | None
     report: WeldReport
+    others: tuple[Weld, ...] = ()
 
 
 def unplanned(result: PlanResult) -> tuple[str, ...]:
@@ -97,6 +110,20 @@ def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float
     if not 1 <= number <= count:
         raise InputError(f"seam {number}: {count} found, numbered from 1", seam=number, found=count)
     return number - 1
+
+
+def seams_to_weld(
+    result: PlanResult, number: int | Literal["all"] | None, near: Sequence[float] | None
+) -> tuple[tuple[int, TorchPath], ...]:
+    """Index and path of every seam that is meant, one unless all are, best first; none where there is no seam.
+
+    Raises:
+        InputError, PathError: see `to_weld`.
+    """
+    if number == "all":
+        return tuple((index, path) for index, path in enumerate(result.paths) if path is not None)
+    index, path = to_weld(result, number, near)
+    return () if path is None else ((index, path),)
 
 
 def to_weld(result: PlanResult, number: int | None, near: Sequence[float] | None) -> tuple[int, TorchPath | None]:

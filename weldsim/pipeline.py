@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from weldsim.clock import Clock, Tell
 from weldsim.cloud.deproject import deproject
@@ -17,11 +17,14 @@ from weldsim.cloud.files import check_plannable
 from weldsim.cloud.filters import prepare
 from weldsim.cloud.views import merge_views
 from weldsim.config import CellConfig, digest, limits_for
-from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, pick, to_weld, unplanned
+from weldsim.errors import ExecutionError
+from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, Weld, pick, seams_to_weld, unplanned
 from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.plan import plan_paths
-from weldsim.records import ExecutionLog, PointCloud, TorchPath
-from weldsim.report.weld import weld_report
+from weldsim.records import ExecutionLog, PointCloud, TorchPath, WeldReport
+from weldsim.report.limits import REGION
+from weldsim.report.progress import weld_progress
+from weldsim.report.weld import joined, weld_report
 from weldsim.scan.stand import scan
 from weldsim.seam.find import find_seams
 from weldsim.search import search
@@ -31,9 +34,9 @@ from weldsim.sensor.choose import SensorName, posture
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from weldsim.motion.plan import MotionPlan
     from weldsim.scan.tour import Tour
     from weldsim.scene.config import SceneConfig
+    from weldsim.scene.workpieces.base import Workpiece
     from weldsim.scene.world import World
 
 __all__ = [
@@ -61,7 +64,7 @@ def run(
     *,
     seed: int = 0,
     sensor: SensorName = "d415",
-    number: int | None = None,
+    number: int | Literal["all"] | None = None,
     near: Sequence[float] | None = None,
     video: "Path | None" = None,
     black_boxes: "Path | None" = None,
@@ -69,10 +72,12 @@ def run(
 ) -> RunResult:
     """The twin scans the scene, plans and welds what it found, and is judged against the scene's known seams.
 
+    A weld that is stopped is a result too: its report says so, and how far it came.
+
     Args:
         scene: what stands on the table.  config: everything else.
         seed: of the camera's noise.  sensor: which camera looks.
-        number, near: which seam to weld; see `pick`.
+        number, near: which seam to weld; see `pick`; "all" welds every one that has a path, one after the other.
         video: where to write a film of the weld.  black_boxes: folder for what the safety gate leaves behind at a stop.
         tell: told of progress.
     Raises:
@@ -81,7 +86,7 @@ def run(
     config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
     seen = look(scene, config, seed=seed, sensor=sensor, move=config.scan.move, clock=clock)
     result = plan(seen.cloud, config, clock=clock)
-    return finish(seen, result, config, number=number, near=near, video=video, black_boxes=black_boxes, clock=clock)
+    return finish(seen, result, config, number=number, near=near, video=video, black_boxes=black_boxes, stops=True, clock=clock)
 
 
 def look(
@@ -169,71 +174,116 @@ def finish(
     result: PlanResult,
     config: CellConfig,
     *,
-    number: int | None = None,
+    number: int | Literal["all"] | None = None,
     near: Sequence[float] | None = None,
     execute: bool = True,
     video: "Path | None" = None,
     black_boxes: "Path | None" = None,
+    stops: bool = False,
     clock: Clock | None = None,
 ) -> RunResult:
     """What was planned on a sighting, welded by the simulated arm and judged against the scene's known seams.
 
     Args:
         seen: where the cloud came from.  result: what was planned on `seen.cloud`.  config: as planned with.
-        number, near: which seam; see `pick`.
+        number, near: which seam; see `pick`; "all" is every one that has a path.
         execute: whether the arm welds it; without, the plan alone is judged and motion and log are None.
-        video, black_boxes: where to write a film of the weld, and what a stop leaves behind.  clock: takes the times.
+        video, black_boxes: where to write a film of the weld, and what a stop leaves behind.
+        stops: whether a weld that is stopped on its way is a result, or raised.  clock: takes the times.
     Raises:
         MotionError, ExecutionError: the arm cannot.  InputError: a seam number that there is not.
         PathError: the seam that is meant has no path.
     """
     clock, world = clock or Clock(), seen.world
-    welded, path = to_weld(result, number, near)
-    motion, log = _weld(seen, path, config, clock, video, black_boxes) if execute and path is not None else (None, None)
+    meant = seams_to_weld(result, number, near)
+    welds = _weld(seen, meant, config, clock, video, black_boxes) if execute and meant else ()
+    if welds and welds[-1].error is not None and not stops:
+        raise welds[-1].error
     with clock.stage("report"):
-        report = weld_report(
-            result.findings,
-            tuple(None if each is None else replace(each, X_BT=wire_tip(each.X_BT, config.path)) for each in result.paths),
-            scene=world.config.name,
-            log=None if log is None else replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
-            known=tuple(seam if path is None else leaned(seam, path, config.path) for seam in world.known_seams),
-            true_region=true_region(seen.captures, result.cloud),
-            welded=welded,
-            unplanned=unplanned(result),
-            trims=(config.path.start_trim, config.path.end_trim),
-            seed=seen.seed,
-            config_digest=result.config_digest,
-            config=limits_for(config, world.config),
-        )
+        limits = limits_for(config, world.config)
+        reports = [
+            _report(seen, result, config, index, path, next((weld for weld in welds if weld.seam == index), None))
+            for index, path in (*meant[: max(1, len(welds))], *(() if meant else ((0, None),)))
+        ]
+        report = joined(tuple(reports), limits)
     report = replace(report, timing=dict(clock.seconds))
+    first = welds[0] if welds else None
     return RunResult(
         world=world,
         captures=seen.captures,
         registration=seen.registration,
         tour=seen.tour,
         plan=result,
-        welded=welded,
-        motion=motion,
-        log=log,
+        welded=meant[0][0] if meant else 0,
+        motion=None if first is None else first.motion,
+        log=None if first is None else first.log,
+        others=welds[1:],
         report=report,
     )
 
 
+def _report(
+    seen: Sighting, result: PlanResult, config: CellConfig, index: int, path: TorchPath | None, weld: Weld | None
+) -> WeldReport:
+    """The report of one seam; `weld` is what was done of it."""
+    world, log = seen.world, None if weld is None else weld.log
+    known = tuple(seam if path is None else leaned(seam, path, config.path) for seam in world.known_seams)
+    part = world.workpiece
+    return weld_report(
+        result.findings,
+        tuple(None if each is None else replace(each, X_BT=wire_tip(each.X_BT, config.path)) for each in result.paths),
+        scene=world.config.name,
+        log=None if log is None else replace(log, X_BT_act=wire_tip(log.X_BT_act, config.path)),
+        known=known if part.seams_are_known else None,
+        true_region=true_region(seen.captures, result.cloud) if part.region_is_known else None,
+        welded=index,
+        unplanned=unplanned(result),
+        trims=(config.path.start_trim, config.path.end_trim),
+        unjudged=_unjudged(part),
+        stopped=None if weld is None or weld.error is None else str(weld.error),
+        progress=None if weld is None else weld_progress(weld.log, weld.path, weld.path, arc=True),
+        seed=seen.seed,
+        config_digest=result.config_digest,
+        config=limits_for(config, world.config),
+    )
+
+
+def _unjudged(part: "Workpiece") -> tuple[tuple[str, str], ...]:
+    """Figures for which nothing is known of a part, and why."""
+    if not part.seams_are_known:
+        why = "not judged: no seam is known ([mesh] names no seam file)"
+        return tuple((figure, why) for figure in ("distance from the known seam", "phantom seams", REGION))
+    return () if part.region_is_known else ((REGION, "not judged: the seam file has no width"),)
+
+
 def _weld(
-    seen: Sighting, path: TorchPath, config: CellConfig, clock: Clock, video: "Path | None", black_boxes: "Path | None"
-) -> tuple["MotionPlan", ExecutionLog]:
-    """The motion from the last scan view along the path, and what the simulated arm did of it."""
+    seen: Sighting,
+    meant: Sequence[tuple[int, TorchPath]],
+    config: CellConfig,
+    clock: Clock,
+    video: "Path | None",
+    black_boxes: "Path | None",
+) -> tuple[Weld, ...]:
+    """The motion from the last scan view along the paths, one after the other, and what the simulated arm did of each: of those
+    after one at which it was stopped there is none.
+
+    Raises:
+        MotionError: nothing has moved.
+    """
     from weldsim.execution.gate import SafetyGate
     from weldsim.execution.runner import execute
     from weldsim.execution.simulated import SimulatedRobot
     from weldsim.execution.video import WeldVideo
     from weldsim.motion.collision import CellCollision
-    from weldsim.motion.plan import plan_motion
+    from weldsim.motion.sequence import plan_sequence
 
     world, last = seen.world, len(seen.captures) - 1
     q_start = posture(world, seen.sensor, last) if seen.tour is None else seen.tour.q
+    names = [f"seam {index + 1}" for index, _ in meant]
     with clock.stage("motion"):
-        motion = plan_motion(path, q_start, config.motion, blocked=CellCollision(world.model))
+        blocked = CellCollision(world.model)
+        motions = plan_sequence([path for _, path in meant], q_start, config.motion, blocked=blocked, names=names)
+    welds: list[Weld] = []
     with clock.stage("execution"), ExitStack() as stack:
         film, simulation = None, config.execution.simulation
         if video is not None:
@@ -241,8 +291,23 @@ def _weld(
             simulation = replace(simulation, frame_period=film.frame_period)
         arm = SimulatedRobot(world.model, q_start, simulation, film)
         robot = stack.enter_context(SafetyGate(arm, config.execution.gate, arc=True, folder=black_boxes))
-        log = execute(robot, motion.trajectory, config.execution, lambda done: clock.tell("execution", done))
-    return motion, log
+        for k, ((index, path), motion) in enumerate(zip(meant, motions, strict=True)):
+            weld = partial(Weld, seam=index, path=path, motion=motion)
+            tell = partial(_tell_part, clock, k, len(meant))
+            try:
+                welds.append(weld(log=execute(robot, motion.trajectory, config.execution, tell)))
+            except ExecutionError as error:
+                log = error.data.get("log")
+                if not isinstance(log, ExecutionLog):  # before anything moved
+                    raise
+                welds.append(weld(log=log, error=error))
+                break
+    return tuple(welds)
+
+
+def _tell_part(clock: Clock, k: int, count: int, done: float) -> None:
+    """Progress of the k-th of `count` welds."""
+    clock.tell("execution", (k + done) / count)
 
 
 def _tour(world: "World", config: CellConfig, seed: int, sensor: SensorName, clock: Clock) -> "Tour":

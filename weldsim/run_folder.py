@@ -5,7 +5,7 @@ import itertools
 import json
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,10 +113,11 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     limits = limits_for(config, scene)
     write_json(folder / "report.json", report_json(report, limits))
     seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": limits}
-    write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, **seen)
+    others = {weld.seam: weld.log for weld in result.others}
+    write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, others=others, **seen)
     write_png(folder / "report.png", report, plan.cloud, plan.findings, plan.paths, **seen)
     if result.log is not None:
-        write_whole(folder / "log.npz", log_bytes(result.log))
+        write_whole(folder / "log.npz", log_bytes({result.welded: result.log, **others}))
     manifest = {
         "schema": SCHEMA,
         "scene": scene.name,
@@ -146,15 +147,25 @@ def tour_bytes(logs: tuple[ExecutionLog, ...]) -> bytes:
     return buffer.getvalue()
 
 
-def log_bytes(log: ExecutionLog) -> bytes:
-    """The log as an NPZ: its arrays by name, X_BT_act as position and quaternion wxyz, events as lines of text."""
-    arrays: dict[str, Any] = {name: getattr(log, name) for name in ("t", "q_cmd", "q_act", "qd_act", "s_cmd", "arc_on")}
-    if log.torque is not None:
-        arrays["torque"] = log.torque
-    arrays["position_B"], arrays["quaternion_wxyz"] = log.X_BT_act.p, log.X_BT_act.quaternion
-    arrays["segments"] = np.array([segment.value for segment in log.segments])
-    arrays["events"] = np.array([f"{event.t:.3f} s {event.kind}: {event.text}" for event in log.events])
-    arrays["period"], arrays["robot"] = np.array(log.period), np.array(log.robot)
+def log_bytes(logs: Mapping[int, ExecutionLog]) -> bytes:
+    """Logs of a job as one NPZ: arrays by name, one log after the other; X_BT_act as position and quaternion wxyz, events as
+    lines of text, and `seam`, the number of the seam that each row belongs to, from 1.
+
+    Args:
+        logs: by the seam's index, in order.
+    """
+    each = list(logs.values())
+    names = ("t", "q_cmd", "q_act", "qd_act", "s_cmd", "arc_on")
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(log, name) for log in each]) for name in names}
+    torques = [log.torque for log in each if log.torque is not None]
+    if len(torques) == len(each):
+        arrays["torque"] = np.concatenate(torques)
+    arrays["position_B"] = np.concatenate([log.X_BT_act.p for log in each])
+    arrays["quaternion_wxyz"] = np.concatenate([log.X_BT_act.quaternion for log in each])
+    arrays["segments"] = np.array([segment.value for log in each for segment in log.segments])
+    arrays["events"] = np.array([f"{event.t:.3f} s {event.kind}: {event.text}" for log in each for event in log.events])
+    arrays["seam"] = np.repeat([index + 1 for index in logs], [len(log.t) for log in each])
+    arrays["period"], arrays["robot"] = np.array(each[0].period), np.array(each[0].robot)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()

@@ -1,6 +1,5 @@
 """`weldsim execute`."""
 
-import re
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from weldsim.records import ExecutionLog
     from weldsim.welding.job import Job, JobConfig
 
-FROM = re.compile(r"-from-\d+$")  # what a directory of the rest of a weld ends in
 MARKS = {True: "ok", False: "FAIL", None: "-"}
 
 
@@ -144,7 +142,8 @@ class Execute(ConfigOptions):
             return empty_cell(), None
         from weldsim.scene.world import build_world
 
-        return scene_cell(scene), build_world(scene, twin=config.twin).known_seams
+        world = build_world(scene, twin=config.twin)
+        return scene_cell(scene), world.known_seams if world.workpiece.seams_are_known else None
 
     def _robot(self, config: "CellConfig", cell: "Cell") -> "Robot":
         if self.robot == "sim":
@@ -204,29 +203,17 @@ class Execute(ConfigOptions):
 
     def _way_on(self, done: "Job", folder: Path) -> str:
         """How to go on with a weld that was stopped: the command, or that nothing is left. Args: folder, its run directory."""
-        from weldsim.welding.rest import SHORTEST
+        from weldsim.welding.rest import way_on
 
-        far = done.progress
-        if far is None:
+        if done.progress is None:
             return ""
-        left = float(done.path.s[done.path.weld][-1]) - far.s_to
-        if left < SHORTEST:
-            return f"{units.to_mm(left):.1f} mm of the seam are left, too little to go on with"
         words = ["weldsim", "execute", str(self.file), "--robot", self.robot]
         words += [] if self.host is None else ["--host", self.host]
         words += [] if self.scene is None else ["--scene", self.scene]
         words += ["--arc"] if self.arc else []
         words += [] if self.speed_scale == 1 else ["--speed-scale", f"{self.speed_scale:g}"]
         words += [] if self.seam == 1 else ["--seam", str(self.seam)]
-        words += self._settings()
-        if far.welded > 0:
-            whole_tenths = int(far.s_to * 1e4 + 1e-6)  # rounded up, a gap would be left
-            words += ["--from", f"{whole_tenths / 10:g} mm"]
-            words += ["--out", str(folder.with_name(f"{FROM.sub('', folder.name)}-from-{far.s_to * 1e3:.0f}"))]
-            return f"to go on from there: {shlex.join(words)}"
-        words += [] if self.from_ is None else ["--from", self.from_]
-        words += ["--out", str(folder)]
-        return f"nothing of it is welded; to weld it: {shlex.join(words)}"
+        return way_on([*words, *self._settings()], done.progress, done.path, folder, self.from_)
 
     def _settings(self) -> list[str]:
         """The options that repeat this command's settings."""

@@ -1,8 +1,8 @@
 """`weldsim run`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
@@ -11,6 +11,7 @@ from weldsim.errors import InputError, SensorError
 from weldsim.sensor.choose import SensorName
 
 if TYPE_CHECKING:
+    from weldsim.jobs import RunResult
     from weldsim.records import WeldReport
     from weldsim.report.limits import ReportConfig
 
@@ -34,8 +35,8 @@ class Run(ConfigOptions):
     method: Method | None = None
     """Seam finder: ours (the default) or the published one."""
 
-    seam: int | None = None
-    """Which seam to weld, counted from 1, the best one (the default)."""
+    seam: int | Literal["all"] | None = None
+    """Which seam to weld, counted from 1, the best one (the default); `all` welds every one, one after the other."""
 
     near: tuple[float, float, float] | None = None
     """Weld the seam nearest to this point in the base [m]."""
@@ -51,7 +52,7 @@ class Run(ConfigOptions):
         refuse_together(seam=self.seam, near=self.near)
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: 0 or more is needed", seed=self.seed)
-        if self.seam is not None and self.seam < 1:
+        if isinstance(self.seam, int) and self.seam < 1:
             raise InputError(f"--seam {self.seam}: seams are counted from 1", seam=self.seam)
         config, scene = self.cell(self.method), self.scene_config()
         folder = self.out or Path("runs") / f"{scene.name}-{self.seed}"
@@ -76,6 +77,8 @@ class Run(ConfigOptions):
                 black_boxes=folder.with_name(f"{folder.name}.black-box"),
                 tell=tell,
             )
+            if result.report.stopped is not None:
+                result = replace(result, report=replace(result.report, way_on=self._way_on(result, folder)))
             tell("writing", None)
             kept = write_run(folder, result, config, scene, self.seed, self.sensor)
         written = [folder, *([self.video] if self.video is not None and result.log is not None else [])]
@@ -83,9 +86,24 @@ class Run(ConfigOptions):
         if self.json:
             self._print_json(result.report, limits, written, kept)
         else:
-            self._print(result.report, limits, len(result.plan.findings.seams), (*result.world.workpiece.notes, *(result.motion.notes if result.motion else ())))
+            self._print(result.report, limits, len(result.plan.findings.seams), (*result.world.workpiece.notes, *notes(result)))
             print_written(written, kept)
         return 0 if result.report.passed else 1
+
+    def _way_on(self, result: "RunResult", folder: Path) -> str:
+        """How to go on with a weld that was stopped: the command that welds the rest of the planned path."""
+        from weldsim.welding.rest import way_on
+
+        index = result.others[-1].seam if result.others else result.welded
+        path = result.plan.paths[index]
+        if result.report.progress is None or path is None:
+            return ""
+        number = sum(each is not None for each in result.plan.paths[: index + 1])
+        words = ["weldsim", "execute", str(folder / "path.json"), "--robot", "sim", "--scene", self.scene, "--arc"]
+        words += [] if number == 1 else ["--seam", str(number)]
+        words += [] if self.config is None else ["--config", str(self.config)]
+        words += [word for text in self.set for word in ("--set", text)]
+        return way_on(words, result.report.progress, path, folder)
 
     def scene_config(self) -> Any:
         """The scene, without a name that could lead out of its folder. Raises SceneError, ConfigError."""
@@ -113,11 +131,23 @@ class Run(ConfigOptions):
 
         word, why = verdict(report, found, limits)
         print(f"{report.scene}, seed {report.seed}, {self.sensor}, method {report.method}: {word}, {why}")
+        if report.way_on:
+            print(f"  {report.way_on}")
         print(table(check_rows(checks(report, limits)), ("figure", "measured", "limit", "")))
         for reason in () if report.passed else report.reasons[1:]:
             print(f"  {reason}")
         for warning in report.warnings:
             print(f"  amber: {warning}")
+        if 0 < report.welded < report.seams and self.seam != "all" and report.stopped is None:
+            print("  --seam all welds every one")
         for note in notes:
             print(f"  {note}")
         print(times(report.timing))
+
+
+def notes(result: "RunResult") -> tuple[str, ...]:
+    """What the plans of the motions have to say, by seam where there are several."""
+    if not result.others:
+        return result.motion.notes if result.motion else ()
+    motions = [(result.welded, result.motion), *((weld.seam, weld.motion) for weld in result.others)]
+    return tuple(f"seam {index + 1}: {note}" for index, motion in motions if motion is not None for note in motion.notes)

@@ -62,6 +62,7 @@ def plan_motion(
     arm: Arm = UR5,
     blocked: Blocked | None = None,
     rungs: Rungs | None = None,
+    home: Float[ndarray, "6"] | None = None,
 ) -> MotionPlan:
     """The joint trajectory that welds the path: air move, lead-in, weld at the path's speed, lead-out, air move home.
 
@@ -73,6 +74,7 @@ def plan_motion(
         q_start: joint angles at t = 0 [rad].
         arm: that welds, with its torch: the joint angles are its own, `blocked` takes them.
         rungs: of the path's own rail with the same settings, where they have been made already.
+        home: where the arm goes in the end, where `config.return_home` has it go [rad]; q_start by default.
         blocked: names what a configuration touches, or None (`CellCollision`); nothing planned then touches anything, as
             far as samples of the motion show. Without it only the arm's centre lines are kept clear of table and torch.
     Raises:
@@ -80,12 +82,13 @@ def plan_motion(
         MotionError: reachable pose by pose, but in no single sweep of the arm; `data`: index, s, reason.
     """
     config = config or MotionConfig()
+    home = q_start if home is None else home
     inside = np.abs(q_start) <= JOINT_LIMIT
     if not inside.all():
         joint = int(np.flatnonzero(~inside)[0])
         raise MotionError(f"start: {JOINT_NAMES[joint]} at {np.rad2deg(q_start[joint]):.0f} deg (limit +-360 deg)", joint=joint)
     try:
-        return _in_one(path, q_start, q_start if config.return_home else None, config, arm, blocked, rungs)
+        return _in_one(path, q_start, home if config.return_home else None, config, arm, blocked, rungs)
     except MotionError as error:
         split = error.data.get("split")
         if not isinstance(split, tuple) or not split:
@@ -94,7 +97,7 @@ def plan_motion(
         if len(split) >= config.pieces:
             raise MotionError(f"{error}; weld it {pieces} (motion.pieces = {len(split) + 1})", **error.data) from None
         try:
-            return _in_pieces(path, split, q_start, config, arm, blocked)
+            return _in_pieces(path, split, q_start, home, config, arm, blocked)
         except MotionError as second:
             why = f"{second.data.get('reason', second)} at s = {1e3 * float(str(second.data.get('s', 0.0))):.1f} mm"
             raise MotionError(f"{error}; nor does it go {pieces}: {why}", **{**error.data, "split": ()}) from None
@@ -104,6 +107,7 @@ def _in_pieces(
     path: TorchPath,
     split: tuple[float, ...],
     q_start: Float[ndarray, "6"],
+    q_home: Float[ndarray, "6"],
     config: MotionConfig,
     arm: Arm,
     blocked: Blocked | None,
@@ -111,7 +115,7 @@ def _in_pieces(
     """The plan of a path cut at arc lengths `split` [m], one piece after the other."""
     plans, q, pieces = [], q_start, cut_path(path, split)
     for piece in pieces:
-        home = q_start if config.return_home and piece is pieces[-1] else None
+        home = q_home if config.return_home and piece is pieces[-1] else None
         plans.append(_in_one(piece, q, home, config, arm, blocked))
         q = plans[-1].trajectory.q[-1]
     slowest = min(plans, key=lambda plan: plan.slowest)

@@ -26,7 +26,7 @@ def scene(
     cloud: PointCloud,
     findings: SeamFindings,
     paths: tuple[TorchPath | None, ...],
-    log: ExecutionLog | None,
+    logs: tuple[ExecutionLog, ...],
     known: tuple[KnownSeam, ...],
     stopped_B: tuple[float, float, float] | None = None,
 ) -> Figure:
@@ -55,8 +55,8 @@ def scene(
         wires[:, :2] = torch_axes(path)
         data.append(_line("wire", wires.reshape(-1, 3), WIRE, 4, legend=i == 0))
     data += [_line("known seam", k.opening_B, KNOWN, 4, legend=i == 0) for i, k in enumerate(known)]
-    if log is not None and log.arc_on.any():
-        data.append(_line("executed tip", _thin(log.X_BT_act.p[log.arc_on]), LINES["executed"], 3))
+    for i, log in enumerate(log for log in logs if log.arc_on.any()):
+        data.append(_line("executed tip", _thin(log.X_BT_act.p[log.arc_on]), LINES["executed"], 3, legend=i == 0))
     if stopped_B is not None:
         data.append(_dots("stopped here", np.array([stopped_B]), {"size": 9, "color": BAD, "symbol": "x"}) | {"showlegend": True})
     eye = 0.9 * X_BS.R[:, 2] - 0.75 * X_BS.R[:, 1]

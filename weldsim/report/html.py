@@ -2,6 +2,7 @@
 
 import importlib.resources
 import json
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
@@ -58,6 +59,7 @@ def write_html(
     log: ExecutionLog | None = None,
     known: tuple[KnownSeam, ...] = (),
     welded: int = 0,
+    others: Mapping[int, ExecutionLog] | None = None,
     joint_names: tuple[str, ...] = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3"),
     config: ReportConfig | None = None,
 ) -> Path:
@@ -68,18 +70,23 @@ def write_html(
         cloud, findings, paths: what was seen, found and planned.
         log: what the arm did along `paths[welded]`; adds speed and joints.
         known: the true seams; adds the errors along the seam.
+        others: what the arm did along other paths of the job, by their index.
         joint_names: in the order of the log's columns.
         config: the limits the verdict was made with.
     """
     config = config or ReportConfig()
     drawn: list[figures.Figure] = []
     body = [_header(report, findings, config), _cards(report, findings), _checks(checks(report, config))]
-    body.append(
-        _figure(drawn, "Cloud, seam and torch path", figures.scene(cloud, findings, paths, log, known, stopped_place(report)))
-    )
+    driven = tuple(each for each in (log, *(others or {}).values()) if each is not None)
+    scene = figures.scene(cloud, findings, paths, driven, known, stopped_place(report))
+    body.append(_figure(drawn, "Cloud, seam and torch path", scene))
     stopped = None if report.stopped is None or report.progress is None else report.progress.s_to
-    plots = _plots(drawn, cloud, findings, paths, log, known, welded, joint_names, config, stopped)
-    body.append(f'<div class="two">{"".join(plots)}</div>')
+    logs = {welded: log, **(others or {})}
+    for index, each in logs.items():
+        here = stopped if index == list(logs)[-1] else None  # the job ended there
+        plots = _plots(drawn, cloud, findings, paths, each, known, index, joint_names, config, here)
+        title = f"<h2>Seam {index + 1}</h2>" if len(logs) > 1 else ""
+        body.append(f'{title}<div class="two">{"".join(plots)}</div>')
     body.append(f'<div class="two">{_seams(findings)}{_refused(findings)}{_threshold(findings.threshold)}{_timing(report)}</div>')
     body.append(_footer(report))
     return write_whole(path, _page(report.scene, "".join(body), drawn))

@@ -62,6 +62,7 @@ class ReportConfig:
 
 
 GENERAL = ReportConfig()
+REGION = "groove region overlap (IoU)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +124,7 @@ def _own_checks(report: WeldReport, config: ReportConfig) -> list[Check]:
         passed = report.phantom_seams <= config.phantoms
         out.append(Check(figure="phantom seams", value=str(report.phantom_seams), limit=str(config.phantoms), passed=passed))
     if report.iou is not None:
-        out.append(_shown("groove region overlap (IoU)", f"{report.iou:.3f}"))
+        out.append(_shown(REGION, f"{report.iou:.3f}"))
     if report.sigma_coverage is not None:
         one, two = report.sigma_coverage
         out.append(_shown("errors within 1 and 2 sigma (normal: 68 %, 95 %)", f"{100 * one:.0f} %, {100 * two:.0f} %"))

@@ -16,7 +16,7 @@ LOOKS: dict[str, Look] = {PASSED: "good", AMBER: "amber", FAILED: "bad", STOPPED
 def verdict(report: WeldReport, found: int, config: ReportConfig) -> tuple[str, str]:
     """A headline and what decided it: how a job ended that was judged, or else how many seams were found."""
     judged = sum(check.passed is not None for check in checks(report, config))
-    part = f"{seams_welded(report)}; " if report.welded and report.seams > 1 else ""
+    part = f"{seams_welded(report)}; " if report.seams > 1 and (report.welded or report.stopped is not None) else ""
     if report.stopped is not None:
         return STOPPED, f"{part}{stopped_at(report)}"
     if not report.passed:
@@ -68,10 +68,11 @@ def stopped_at(report: WeldReport) -> str:
     done = report.progress
     if done is None:
         return f"{report.stopped}"
+    which = f"seam {report.others[-1].seam}, " if report.others else ""  # the one at which the job ended
     length, s = (units.to_mm(value) for value in (done.length, done.s_to))
     if done.welded <= 0:
-        return f"before the weld began: 0 of {length:.0f} mm {'welded' if done.arc else 'travelled'}"
-    return f"at s = {s:.1f} mm: {progress_text(report)}"
+        return f"{which}before the weld began: 0 of {length:.0f} mm {'welded' if done.arc else 'travelled'}"
+    return f"{which}at s = {s:.1f} mm: {progress_text(report)}"
 
 
 def stopped_place(report: WeldReport) -> tuple[float, float, float] | None:

@@ -71,7 +71,7 @@ def weld_report(
         unplanned=unplanned,
         unjudged=unjudged,
         seam=welded + 1,
-        welded=int(log is not None and bool(log.arc_on.any())),
+        welded=int(log is not None and stopped is None and bool(log.arc_on.any())),
         seams=len(findings.seams) if known is None else len(known),
         stopped=stopped,
         progress=progress,

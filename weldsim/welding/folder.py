@@ -58,7 +58,7 @@ def write_job(
             write_json(place / "dry_run.json", dry_run_json(dry))
         if done.log is not None and done.report is not None:
             limits = limits_for(config, scene)
-            write_whole(place / "log.npz", log_bytes(done.log))
+            write_whole(place / "log.npz", log_bytes({job.seam: done.log}))
             write_json(place / "report.json", report_json(done.report, limits))
             paths = tuple(done.path if i == job.seam else each for i, each in enumerate(program.paths))
             shown = {"log": done.log if job.arc else judged(done.log), "known": known or (), "welded": job.seam, "config": limits}

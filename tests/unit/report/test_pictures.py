@@ -39,8 +39,8 @@ def all_figures() -> dict[str, figures.Figure]:
     speed = figures.torch_speed(LOG, PATH, ReportConfig())
     assert speed is not None
     return {
-        "scene": figures.scene(CLOUD, FOUND, (PATH,), LOG, (KNOWN,)),
-        "empty scene": figures.scene(CLOUD, findings((), INSIDE), (), None, ()),
+        "scene": figures.scene(CLOUD, FOUND, (PATH,), (LOG,), (KNOWN,)),
+        "empty scene": figures.scene(CLOUD, findings((), INSIDE), (), (), ()),
         "uncertainty": figures.uncertainty(SEAM),
         "section": figures.section(cross_section(CLOUD, SEAM)),
         "across": figures.errors_across(lines),
@@ -57,7 +57,7 @@ def test_a_path_file_has_no_surface_to_show(tmp_path: Path) -> None:
     found = SeamFindings(seams=(SEAM,), region=np.zeros(len(SEAM.points_B), np.int32), method="path file")
     assert shows_surface(CLOUD, (SEAM,))
     assert not shows_surface(bare, (SEAM,))
-    drawn = figures.scene(bare, found, (PATH,), LOG, ())
+    drawn = figures.scene(bare, found, (PATH,), (LOG,), ())
     assert "cloud" not in [trace["name"] for trace in drawn["data"]]
     ratio = drawn["layout"]["scene"].get("aspectratio", {"x": 0.0})
     assert max(ratio.values()) <= figures.LONGEST + 1e-9

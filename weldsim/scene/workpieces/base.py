@@ -175,6 +175,16 @@ class Workpiece(ABC):
     def clamp_places(self, count: int) -> tuple[ClampPlace, ...]:
         """Where 0, 2 or 4 clamps hold it."""
 
+    @property
+    def seams_are_known(self) -> bool:
+        """Whether somebody knows where the seams are, or that there are none."""
+        return True
+
+    @property
+    def region_is_known(self) -> bool:
+        """Whether somebody knows which of its surface lies in a groove."""
+        return self.seams_are_known
+
     def known_seams(self, X_BP: Transform) -> tuple[KnownSeam, ...]:
         """The true seams expressed in the robot base."""
         return tuple(curve.in_base(X_BP) for curve in self.seam_curves())

@@ -98,6 +98,14 @@ class UserMesh(Workpiece):
     def seam_curves(self) -> tuple[SeamCurve, ...]:
         return () if self.curve is None else (self.curve,)
 
+    @property
+    def seams_are_known(self) -> bool:
+        return self.curve is not None
+
+    @property
+    def region_is_known(self) -> bool:
+        return self.width is not None
+
     def collision_boxes(self) -> tuple[Box, ...]:
         """Upright boxes that fill the part, column by column; neighbours of equal height are one."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
