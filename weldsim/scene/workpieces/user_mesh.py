@@ -15,6 +15,7 @@ from weldsim.frames import unit
 from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCurve, Workpiece
 from weldsim.scene.workpieces.mesh_file import read_mesh_file
 from weldsim.scene.workpieces.seam_file import SeamFile, read_seam_file
+from weldsim.scene.workpieces.seam_order import check_order
 from weldsim.scene.workpieces.solid import SWEEP_STEP
 from weldsim.scene.workpieces.triangles import column_runs, distance_to_faces, ray_lengths
 
@@ -135,7 +136,7 @@ def make_user_mesh(config: MeshConfig) -> UserMesh:
 
     Raises:
         SceneError: a file that is missing, of another kind or unreadable, a surface that is not closed or too fine, a size that
-            speaks of another unit, or a seam that lies off the part.
+            speaks of another unit, or a seam that lies off the part or whose points are not in order.
     """
     path, scale = Path(config.file), METRES[config.units]
     mesh = read_mesh_file(path)
@@ -147,6 +148,7 @@ def make_user_mesh(config: MeshConfig) -> UserMesh:
         origin = np.array([*(low + high)[:2] / 2, high[2]])
         return UserMesh(path.stem, digest.hexdigest(), vertices - origin, faces, None, None, notes)
     seam = read_seam_file(Path(config.seam), scale)
+    check_order(Path(config.seam), seam.points)
     digest.update(Path(config.seam).read_bytes())
     _check_near(Path(config.seam), seam, vertices, faces)
     middle = resample(seam.points, SWEEP_STEP)
