@@ -4,17 +4,23 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from tests.e2e.test_cli_execute import advice, stopped_at
 from weldsim.cli import main
+from weldsim.cli.run import Run
 from weldsim.cloud.files import read_cloud
-from weldsim.config import load_config, structure, to_json
+from weldsim.config import CellConfig, load_config, load_scene, structure, to_json
 from weldsim.path.files import path_text, read_path_json
-from weldsim.scene.config import SceneConfig
+from weldsim.pipeline import finish, look, plan
+from weldsim.records import WeldReport
+from weldsim.report.limits import ReportConfig, checks
+from weldsim.scene.config import SceneConfig, make_workpiece
 from weldsim.scene.files import scene_names
 
 pytestmark = pytest.mark.render
@@ -89,7 +95,7 @@ def test_the_resolved_config_can_be_read_back(welded):
     assert to_json(structure(resolved["scene"], SceneConfig)) == resolved["scene"]
 
 
-def test_the_same_seed_gives_the_same_bytes_in_another_process_and_replaces_the_run(welded, tmp_path, monkeypatch, capsys):
+def test_the_same_seed_gives_the_same_bytes_in_another_process_and_the_earlier_run_is_kept(welded, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     old = tmp_path / "again"
     old.mkdir()
@@ -102,8 +108,10 @@ def test_the_same_seed_gives_the_same_bytes_in_another_process_and_replaces_the_
     paths = [read_path_json(folder / "path.json") for folder in (old, welded[0] / "runs/straight-1")]
     assert path_text(paths[0], timing=False) == path_text(paths[1], timing=False)
     assert (old / "depth.png").read_bytes() == (welded[0] / "runs/straight-1/depth.png").read_bytes()
+    assert "the run that was in again is now again.1" in out
     assert not (old / "left.txt").exists()
-    assert [path.name for path in tmp_path.iterdir()] == ["again"]
+    assert (tmp_path / "again.1" / "left.txt").read_text() == "from an earlier run"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["again", "again.1"]
 
 
 def test_a_failed_verdict_exits_1_and_is_written(tmp_path, monkeypatch, capsys):
@@ -204,3 +212,120 @@ def test_a_run_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch, 
     assert "No space left" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
     assert [path.name for path in old.iterdir()] == ["run.json"]
+
+
+def test_all_seams_are_welded_in_one_job_with_one_report(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    code = main(["run", "y_branches", "--seam", "all", "--sensor", "exact", "--out", "all"])
+    said = capsys.readouterr().out
+    report = json.loads((tmp_path / "all" / "report.json").read_text())
+    assert code == (0 if report["passed"] else 1)
+    assert (report["welded"], report["seams"], len(report["others"])) == (3, 3, 2)
+    assert "3 of 3 seams welded" in said.splitlines()[0]
+    assert "--seam all" not in said
+    assert report["phantom_seams"] == 0
+    for one in (report, *report["others"]):
+        assert one["executed"]["mean"] < 0.5e-3
+        assert one["tracking_p95"] < 0.3e-3
+        assert one["progress"]["welded"] == pytest.approx(one["progress"]["length"], abs=1e-3)
+    assert {check["figure"].partition(":")[0] for check in report["checks"]} >= {"seam 2", "seam 3"}
+    with np.load(tmp_path / "all" / "log.npz") as log:
+        assert [int(log["seam"][0]), *np.unique(log["seam"])] == [1, 1, 2, 3]
+        assert set(log["segments"][log["arc_on"]]) == {"weld"}
+        assert (np.diff(log["t"]) > 0).all()
+        assert np.abs(np.diff(log["q_act"], axis=0)).max() < 0.02  # no jump from one to the next
+    page = (tmp_path / "all" / "report.html").read_text()
+    for text in ("3 of 3 seams welded", "<h2>Seam 1</h2>", "<h2>Seam 3</h2>"):
+        assert text in page
+
+
+def test_one_of_several_seams_names_the_way_to_all_of_them(capsys):
+    """Which the test above follows."""
+    report = WeldReport(passed=True, reasons=(), scene="y", method="profile", welded=1, seams=3, warnings=("1 of 3 seams welded",))
+    report = replace(report, tracking_p95=1e-5)
+    Run(scene="y_branches")._print(report, ReportConfig(), 3, ())
+    said = capsys.readouterr().out
+    assert "PASSED WITH WARNINGS, 1 of 3 seams welded; all 1 limits kept" in said.splitlines()[0]
+    assert "--seam all welds every one" in said
+    assert main(["run", "y_branches", "--seam", "al"]) == 2
+    assert "all" in capsys.readouterr().err
+
+
+def test_a_run_that_is_stopped_is_reported_and_gone_on_with(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with stopped_at(0.1):
+        assert main(["run", "straight", "--sensor", "exact", "--out", "job"]) == 1
+    said = capsys.readouterr().out
+    assert "STOPPED, at s = 99.9 mm: welded 100 of 240 mm" in said.splitlines()[0]
+    report = json.loads((tmp_path / "job" / "report.json").read_text())
+    assert report["stopped"] == "protective stop"
+    assert report["way_on"] in said
+    page = (tmp_path / "job" / "report.html").read_text()
+    assert ">STOPPED<" in page
+    assert "stopped at 99.9 mm" in page
+    words = advice(said)
+    assert words[words.index("--from") + 1] == "99.9 mm"
+    assert main(words) == 0
+    assert "welded 145 of 240 mm from s = 95 mm on" in capsys.readouterr().out
+
+
+@pytest.fixture
+def own_part(tmp_path, monkeypatch):
+    """Writes `mine.toml`, a straight part from files with the lines of a seam file, or without one."""
+    monkeypatch.chdir(tmp_path)
+    part = make_workpiece(load_scene("straight"))
+    curve = part.seam_curves()[0]
+
+    def write(points=None, *, seam=True, width=None):
+        line = 1e3 * (curve.opening if points is None else getattr(curve, points))
+        rows = line if width is None else np.column_stack([line, np.full(len(line), width)])
+        np.savetxt(tmp_path / "seam.csv", rows, delimiter=",", header="x,y,z" + (",width" if width else ""), comments="")
+        text = 'workpiece = "mesh"\n[mesh]\nfile = "part.stl"\nunits = "mm"\n' + ('seam = "seam.csv"\n' if seam else "")
+        (tmp_path / "mine.toml").write_text(text + '[pose]\ny = "-450 mm"\n')
+        mesh = part.build_mesh().to_trimesh()
+        mesh.vertices = mesh.vertices * 1e3
+        mesh.export(tmp_path / "part.stl")
+        return ["run", "mine.toml", "--sensor", "exact", "--set", "scene.views=[{standoff = '400 mm'}]"]
+
+    return write
+
+
+def test_a_part_without_a_seam_file_is_not_judged_by_one(own_part, capsys):
+    assert main(own_part(seam=False)) == 0
+    said = capsys.readouterr().out
+    assert "NOT JUDGED, no known seam to compare with; 1 found" in said.splitlines()[0]
+    assert "not judged: no seam is known" in said
+    rows = {line.split("  ")[1]: line for line in said.splitlines() if "not judged: " in line}
+    assert all(" - " in line for line in rows.values())
+    assert set(rows) == {"distance from the known seam", "phantom seams", "groove region overlap (IoU)"}
+
+
+def judged(scene):
+    """The report of a plan on a scene's exact cloud, nothing welded."""
+    seen = look(scene, CellConfig(), sensor="exact")
+    return finish(seen, plan(seen.cloud, CellConfig()), CellConfig(), execute=False).report
+
+
+def test_a_seam_without_width_has_no_overlap_of_regions(own_part):
+    own_part()
+    report = judged(load_scene("mine.toml"))
+    assert report.plan is not None
+    assert report.iou is None
+    assert report.unjudged == (("groove region overlap (IoU)", "not judged: the seam file has no width"),)
+    assert [check.value for check in checks(report, ReportConfig()) if "IoU" in check.figure] == ["-"]
+    own_part(width=14.0)
+    report = judged(load_scene("mine.toml"))
+    assert report.iou > 0.8
+    assert report.unjudged == ()
+
+
+def test_a_root_given_as_opening_is_told_and_shuffled_points_are_refused(own_part, capsys, tmp_path):
+    words = own_part("root")
+    reasons = judged(load_scene("mine.toml")).reasons
+    assert any("a seam was found 8.0 mm above it: is the known line the groove's root?" in reason for reason in reasons)
+    lines = (tmp_path / "seam.csv").read_text().splitlines()
+    (tmp_path / "seam.csv").write_text("\n".join([lines[0], *lines[40:], *lines[1:40]]))
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert "not in order along the seam: point " in error
+    assert error.count("\n") == 1

@@ -100,7 +100,7 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
         facts += [f"{units.to_mm(seam.width):.1f} mm wide"] if seam.width > 0 else []  # 0: the method measures none
         facts += [f"confidence {seam.confidence:.2f}"] if seam.confidence > 0 else []
     figure.text(0.05, 0.905, "   |   ".join(facts), fontsize=12, color=SOFT, va="center")
-    figure.text(0.97, 0.905, why, fontsize=12, color=SOFT, va="center", ha="right")
+    figure.text(0.97, 0.905, textwrap.shorten(why, 90, placeholder=" ..."), fontsize=12, color=SOFT, va="center", ha="right")
 
 
 def _plan_view(
