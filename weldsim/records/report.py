@@ -76,6 +76,7 @@ class WeldReport:
         tracking_p95, tracking_max: executed tip from the planned line [m].
         speed_error_max, speed_error_p95: relative, on the weld.
         slowest, fastest: the stretch with the least and the greatest torch speed.  uneven: all that are off by more than told.
+        interruptions: where the arc went out on the weld and where it was lit again, arc lengths [m].
         iou: overlap of the groove region found with the true one.
         phantom_seams: seams found that are no seam.
         unplanned: seams found along which no path can be laid, a clause each.
@@ -100,6 +101,7 @@ class WeldReport:
     slowest: Pace | None = None
     fastest: Pace | None = None
     uneven: tuple[Pace, ...] = ()
+    interruptions: tuple[tuple[float, float], ...] = ()
     iou: float | None = None
     phantom_seams: int | None = None
     sigma_coverage: tuple[float, float] | None = None

@@ -35,7 +35,8 @@ class ReportConfig:
     coverage: float = 0.95
     """Fraction of the known seam's length that must be covered."""
     ends: Metre = 3e-3
-    """Length at each end of the known seam, or of what the trims leave of it, that may be left unwelded or welded beyond it."""
+    """Length at each end of the known seam, or of what the trims leave of it, that may be left unwelded or welded beyond it; and
+    of a gap where the arc was interrupted."""
     axis_median: Radian = 1.5 * DEGREE
     """Median angle between wire and the known bisector."""
     axis_p95: Radian = 4.0 * DEGREE
@@ -120,6 +121,8 @@ def _own_checks(report: WeldReport, config: ReportConfig) -> list[Check]:
         out.append(_slowest(report.slowest, config))
     if report.fastest is not None:
         out.append(_fastest(report.fastest, config))
+    if report.interruptions:
+        out.append(_gap(report.interruptions, config))
     if report.phantom_seams is not None:
         passed = report.phantom_seams <= config.phantoms
         out.append(Check(figure="phantom seams", value=str(report.phantom_seams), limit=str(config.phantoms), passed=passed))
@@ -191,6 +194,23 @@ def _end(figure: str, beyond: float, config: ReportConfig, *, ring: bool = False
     off = max(0.0, -beyond) if ring else abs(beyond)
     word = "short" if beyond < 0 else "overlap" if ring else "beyond"
     return _at_most(figure, off, f"{_mm(abs(beyond), 2)} {word}", _Limit(config, "ends", units.to_mm, "mm"))
+
+
+def _gap(interruptions: tuple[tuple[float, float], ...], config: ReportConfig) -> Check:
+    """The longest stretch between two pieces of weld that was left out; an interruption is amber however short."""
+    out, lit = max(interruptions, key=lambda each: each[1] - each[0])
+    gap = max(0.0, lit - out)
+    limit = _Limit(config, "ends", units.to_mm, "mm")
+    kept = gap <= limit.value
+    places = ", ".join(f"{units.to_mm(s):.0f}" for s, _ in interruptions)
+    return Check(
+        figure="left out where the arc was interrupted",
+        value=f"{_mm(gap, 2)} at s = {units.to_mm(out):.0f} mm",
+        limit=f"<= {limit.text(limit.value)}",
+        passed=kept,
+        amber=limit.amber(kept=kept, in_general=gap <= limit.general)
+        or f"the arc stops and starts on the weld, at s = {places} mm",
+    )
 
 
 def _slowest(pace: Pace, config: ReportConfig) -> Check:

@@ -1,4 +1,6 @@
-"""How far a weld came along its seam: by the arc, or by the way along the weld where the arc was not to burn."""
+"""How far a weld came along its seam and where it was interrupted: by the arc, or by the way where it was not to burn."""
+
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool
@@ -35,6 +37,12 @@ def weld_progress(log: ExecutionLog, path: TorchPath, whole: TorchPath, *, arc: 
         arc=arc,
         position_B=(x, y, z),
     )
+
+
+def interruptions(log: ExecutionLog) -> tuple[tuple[float, float], ...]:
+    """Where the arc went out on the weld and where it was lit again, arc lengths [m]; the second is less where they overlap."""
+    pieces = _pieces(log.arc_on)
+    return tuple((float(log.s_cmd[a]), float(log.s_cmd[b])) for (_, a), (b, _) in pairwise(pieces))
 
 
 def _pieces(on: Bool[ndarray, "k"]) -> list[tuple[int, int]]:

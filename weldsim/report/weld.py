@@ -15,6 +15,7 @@ from weldsim.report.limits import ReportConfig, checks
 from weldsim.report.metrics import line_error, match_seams, region_overlap, sigma_coverage
 from weldsim.report.misses import miss, steady_offset
 from weldsim.report.pace import paces
+from weldsim.report.progress import interruptions
 from weldsim.report.tracking import speed_error, thinned, tracking_error
 from weldsim.report.verdict import warnings
 
@@ -179,6 +180,7 @@ def _against_plan(report: WeldReport, path: TorchPath, log: ExecutionLog, failur
         slowest=slowest,
         fastest=fastest,
         uneven=uneven,
+        interruptions=interruptions(log),
     )
 
 

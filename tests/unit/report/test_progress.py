@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.seams import found_seam, sine_seam, torch_path, weld_log
+from tests.seams import findings, found_seam, sine_seam, torch_path, weld_log
 from weldsim.frames import Transform
 from weldsim.motion.cut import cut_path
 from weldsim.records import ExecutionLog, TorchPath, WeldReport
-from weldsim.report.limits import ReportConfig
+from weldsim.report.limits import ReportConfig, checks
 from weldsim.report.progress import weld_progress
 from weldsim.report.verdict import STOPPED, verdict
+from weldsim.report.weld import weld_report
 
 KNOWN = sine_seam(np.random.default_rng(2))
 PATH = torch_path(found_seam(KNOWN, np.zeros(len(KNOWN.s))))
@@ -61,6 +62,22 @@ def test_the_way_between_pieces_is_not_welded() -> None:
     far = weld_progress(until(0.12, log), PATH, PATH, arc=True)
     assert far.s_to == pytest.approx(0.12, abs=2e-4)
     assert far.welded == pytest.approx(0.09, abs=4e-4)
+
+
+@pytest.mark.parametrize(("begin", "end", "passed"), [(0.05, 0.0502, True), (0.05, 0.0525, True), (0.05, 0.062, False)])
+def test_a_gap_in_the_weld_is_told_and_held_to_the_limit_of_the_ends(begin: float, end: float, passed: bool) -> None:
+    """The line through what was welded has no gap: no figure of it would show one."""
+    log = replace(LOG, arc_on=LOG.arc_on & ((LOG.s_cmd < begin) | (LOG.s_cmd > end)))
+    seam = found_seam(KNOWN, np.zeros(len(KNOWN.s)))
+    report = weld_report(findings((seam,), np.zeros(5, bool)), (PATH,), scene="x", log=log, known=(KNOWN,))
+    assert report.executed is not None
+    assert report.executed.coverage > 0.99
+    ((out, lit),) = report.interruptions
+    assert (out, lit) == pytest.approx((begin, end), abs=2e-4)
+    assert report.passed == passed
+    told = report.warnings if passed else report.reasons
+    assert any(text.startswith("left out where the arc was interrupted") and "at s = 50 mm" in text for text in told)
+    assert not any("interrupted" in check.figure for check in checks(replace(report, interruptions=()), ReportConfig()))
 
 
 def test_a_rest_counts_from_where_it_began() -> None:
