@@ -155,16 +155,19 @@ def log_bytes(logs: Mapping[int, ExecutionLog]) -> bytes:
         logs: by the seam's index, in order.
     """
     each = list(logs.values())
+    # A log begins with the state in which the one before it ended.
+    new = [log.t > (each[k - 1].t[-1] if k else -np.inf) for k, log in enumerate(each)]
     names = ("t", "q_cmd", "q_act", "qd_act", "s_cmd", "arc_on")
-    arrays: dict[str, Any] = {name: np.concatenate([getattr(log, name) for log in each]) for name in names}
-    torques = [log.torque for log in each if log.torque is not None]
-    if len(torques) == len(each):
-        arrays["torque"] = np.concatenate(torques)
-    arrays["position_B"] = np.concatenate([log.X_BT_act.p for log in each])
-    arrays["quaternion_wxyz"] = np.concatenate([log.X_BT_act.quaternion for log in each])
-    arrays["segments"] = np.array([segment.value for log in each for segment in log.segments])
+    columns = [{name: getattr(log, name) for name in names} for log in each]
+    for column, log, index in zip(columns, each, logs, strict=True):
+        if all(other.torque is not None for other in each):
+            column["torque"] = log.torque
+        column["position_B"], column["quaternion_wxyz"] = log.X_BT_act.p, log.X_BT_act.quaternion
+        column["segments"] = np.array([segment.value for segment in log.segments])
+        column["seam"] = np.full(len(log.t), index + 1)
+    rows = list(zip(columns, new, strict=True))
+    arrays: dict[str, Any] = {name: np.concatenate([column[name][keep] for column, keep in rows]) for name in columns[0]}
     arrays["events"] = np.array([f"{event.t:.3f} s {event.kind}: {event.text}" for log in each for event in log.events])
-    arrays["seam"] = np.repeat([index + 1 for index in logs], [len(log.t) for log in each])
     arrays["period"], arrays["robot"] = np.array(each[0].period), np.array(each[0].robot)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)

@@ -216,7 +216,7 @@ def test_a_run_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch, 
 
 def test_all_seams_are_welded_in_one_job_with_one_report(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    code = main(["run", "y_branches", "--seam", "all", "--sensor", "exact", "--out", "all"])
+    code = main(["run", "y_branches", "--seam", "all", "--sensor", "exact", "--set", "path.speed=16 mm/s", "--out", "all"])
     said = capsys.readouterr().out
     report = json.loads((tmp_path / "all" / "report.json").read_text())
     assert code == (0 if report["passed"] else 1)
