@@ -87,14 +87,11 @@ class CellConfig:
 
 
 def limits_for(config: CellConfig, scene: "SceneConfig | None") -> ReportConfig:
-    """The limits of the verdict on a scene: its own where it has some and the config leaves the general ones as they are.
-
-    A weld may be as slow as the dry run lets it be.
-    """
+    """The limits of the verdict on a scene: its own where it has some and the config leaves the general ones as they are."""
     general, report = ReportConfig(), config.report
-    given = {} if scene is None else vars(scene.limits)
-    own = {"least_speed": config.motion.least_speed}
-    own |= {name: value for name, value in given.items() if value is not None and hasattr(report, name)}
+    if scene is None:
+        return report
+    own = {name: value for name, value in vars(scene.limits).items() if value is not None and hasattr(report, name)}
     return replace(report, **{name: value for name, value in own.items() if getattr(report, name) == getattr(general, name)})
 
 

@@ -119,7 +119,7 @@ def _planned(task: Task, method: str, seen: Sighting) -> Row:
         result,
         seen.world.known_seams,
         config,
-        true_region=true_region(seen.captures, result.cloud),
+        true_region=true_region(seen.captures, result.cloud) if seen.world.workpiece.region_is_known else None,
         report=done.report,
     )
     figures = replace(figures, refused=refused or "; ".join(map(str, result.refused.values())))
