@@ -249,7 +249,9 @@ def _arc(log: "ExecutionLog", job: "JobConfig") -> str:
 
 def _word(done: "Job") -> str:
     if done.passed:
-        return "WELDED" if done.log is not None and done.log.arc_on.any() else "DONE, arc off"
+        if done.log is None or not done.log.arc_on.any():
+            return "DONE, arc off"
+        return "WELDED WITH WARNINGS" if done.report is not None and done.report.warnings else "WELDED"
     if done.moved:
         return "STOPPED" if done.stopped is not None else "FAILED"
     return "REFUSED"
