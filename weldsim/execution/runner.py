@@ -127,7 +127,9 @@ def execute(
         robot.stop()
         recorder.end()
         box = "" if robot.black_box is None else f"; black box: {robot.black_box}"
-        raise Interrupted(f"interrupted: the arc is off and the arm was stopped{box}", recorder.log()) from interrupt
+        s, segment = recorder.labels[-1]
+        where = f"; it was at s = {1e3 * s:.1f} mm of the {segment.value}"
+        raise Interrupted(f"interrupted: the arc is off and the arm was stopped{box}{where}", recorder.log()) from interrupt
     except BaseException:
         robot.stop()
         raise
