@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.e2e.test_cli_execute import advice, stopped_at
+from tests.path_files import advice, stopped_at
 from weldsim.cli import main
 from weldsim.cli.run import Run
 from weldsim.cloud.files import read_cloud

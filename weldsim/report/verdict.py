@@ -28,7 +28,7 @@ def verdict(report: WeldReport, found: int, config: ReportConfig) -> tuple[str, 
     if not judged:
         return f"{found} SEAM{'' if found == 1 else 'S'} FOUND", "no known seam to compare with"
     if report.warnings:
-        others = len(report.warnings) - (report.welded < report.seams)
+        others = len(report.warnings) - (0 < report.welded < report.seams)
         return AMBER, part + kept + (f", {others} warning{'s'[: others > 1]}" if others else "")
     return PASSED, part + kept
 
