@@ -213,3 +213,21 @@ def test_what_nothing_is_known_of_is_a_dash_and_not_judged() -> None:
     (row,) = checks(report, ReportConfig())
     assert (row.figure, row.value, row.limit, row.passed) == ("phantom seams", "-", "no seam is known", None)
     assert verdict(report, 1, ReportConfig()) == (UNJUDGED, "no known seam to compare with; 1 found")
+
+
+def test_a_looser_limit_that_is_needed_is_amber_in_a_plan_too() -> None:
+    own = ReportConfig(mean=1e-3)
+    report = job(offset=6e-4, executed=False)
+    assert not report.passed
+    rng = np.random.default_rng(0)
+    known = sine_seam(rng)
+    seam = found_seam(known, np.full(len(known.s), 6e-4))
+    loose = weld_report(findings((seam,), np.zeros(5, bool)), (torch_path(seam),), scene="x", known=(known,), config=own)
+    assert loose.passed
+    assert loose.warnings == ("plan, cross-track mean 0.600 mm (limit <= 1 mm): the general limit is 0.4 mm",)
+    assert verdict(loose, 1, own) == (AMBER, "all 9 limits kept, 1 warning")
+    tight = weld_report(
+        findings((seam,), np.zeros(5, bool)), (torch_path(seam),), scene="x", known=(known,), config=replace(own, mean=5e-4)
+    )
+    assert not tight.passed
+    assert tight.warnings == ()
