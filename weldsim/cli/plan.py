@@ -80,8 +80,9 @@ class Plan(ConfigOptions):
             if page is not None and picture is not None:
                 self._write_report(page, picture, chosen, clock, config)
         if not result.findings.seams:
+            told = "; ".join((_reasons(result.findings), *result.notes))
             raise NoSeamError(
-                f"{self.cloud}: no seam found; {_reasons(result.findings)}{self._hint(config)}",
+                f"{self.cloud}: no seam found; {told}{self._hint(config)}",
                 rejected=[asdict(refused) for refused in result.findings.rejected],
             )
         document = self._document(chosen, numbers, clock)

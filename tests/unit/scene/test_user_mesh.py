@@ -159,7 +159,9 @@ def test_meshes_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
     turned = trimesh.load_mesh(metres.file)
     turned.invert()
     turned.export(tmp_path / "inside_out.stl")
-    assert make_user_mesh(MeshConfig(file=str(tmp_path / "inside_out.stl"), units="m")).build_mesh().to_trimesh().volume > 0
+    mended = make_user_mesh(MeshConfig(file=str(tmp_path / "inside_out.stl"), units="m"))
+    assert mended.build_mesh().to_trimesh().volume > 0
+    assert mended.notes == ("inside_out.stl: it was inside out: turned",)
 
 
 def folder(path: Path) -> Path:
