@@ -6,13 +6,12 @@ imports neither mujoco nor open3d, for every command reads this page).
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Iterable, Mapping
-from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from weldsim import units
 from weldsim.cloud.config import CloudConfig
 from weldsim.errors import ConfigError
 from weldsim.execution.config import ExecutionConfig
@@ -21,20 +20,28 @@ from weldsim.path.config import PathConfig
 from weldsim.report.limits import ReportConfig
 from weldsim.scan.config import ScanConfig
 from weldsim.scene.miscalibration import TwinConfig
-from weldsim.schema import describe, structure, to_json
+from weldsim.schema import HIDDEN, describe, keys, structure, to_json
 from weldsim.seam.config import SeamConfig
 from weldsim.sensor.d415 import D415Config, D435Config
 from weldsim.sensor.kinect import KinectConfig
 from weldsim.sensor.stereo_config import D415StereoConfig
+from weldsim.settings import DEFAULT, Given, Source, apply_overrides, load_toml, meant_keys, value_at, with_sources
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
 
+Config = TypeVar("Config")
+MOST_MEANT = 4  # settings that are named where one is unknown
+SCENE = "scene."
+"""What the key of a scene's setting starts with where it stands beside the cell's, in `--set` say."""
+
 __all__ = [
+    "SCENE",
     "CellConfig",
     "apply_overrides",
     "describe",
     "digest",
+    "for_scene",
     "limits_for",
     "load_config",
     "load_scene",
@@ -85,39 +92,51 @@ class CellConfig:
     report: ReportConfig = field(default_factory=ReportConfig)
     """Limits of the verdict."""
 
+    given: Given = field(default_factory=dict, compare=False, repr=False, metadata=HIDDEN)
+    """Where each value came from that a file or the command line gave; what is not in it is a default, or was set in Python."""
+
+    def source(self, key: str) -> Source:
+        """Where the value at a dotted key came from."""
+        return self.given.get(key, DEFAULT)
+
+
+def for_scene(config: CellConfig, scene: "SceneConfig | None") -> CellConfig:
+    """The config with the scene's own `limits` in it, wherever nothing that goes before them was given.
+
+    What the command line gives goes before what a file gives, that before what the scene has, that before the default; a value
+    set in Python counts as given where it is another than the default, or where `given` names it.
+    """
+    if scene is None:
+        return config
+    tables = {"report": config.report, "motion": config.motion}
+    given = dict(config.given)
+    for limit in fields(scene.limits):
+        value = getattr(scene.limits, limit.name)
+        table = "report" if hasattr(config.report, limit.name) else "motion"
+        if value is None or not _goes_first(config, table, limit.name, scene.given.get(f"limits.{limit.name}")):
+            continue
+        tables[table] = replace(tables[table], **{limit.name: value})
+        given[f"{table}.{limit.name}"] = scene.given.get(f"limits.{limit.name}", Source("scene", scene.name))
+    return replace(config, **tables, given=given)
+
+
+def _goes_first(config: CellConfig, table: str, name: str, scene: Source | None) -> bool:
+    """Whether a scene's limit, which came from `scene`, goes before the config's own value."""
+    cell = config.given.get(f"{table}.{name}")
+    if cell is None:
+        own = getattr(config, table)
+        return getattr(own, name) == getattr(type(own)(), name)
+    return cell.kind == "scene" or (scene is not None and scene.kind == "command line" and cell.kind != "command line")
+
 
 def limits_for(config: CellConfig, scene: "SceneConfig | None") -> ReportConfig:
-    """The limits of the verdict on a scene: its own where it has some and the config leaves the general ones as they are."""
-    general, report = ReportConfig(), config.report
-    if scene is None:
-        return report
-    own = {name: value for name, value in vars(scene.limits).items() if value is not None and hasattr(report, name)}
-    return replace(report, **{name: value for name, value in own.items() if getattr(report, name) == getattr(general, name)})
+    """The limits of the verdict on a scene; see `for_scene`."""
+    return for_scene(config, scene).report
 
 
 def paced_for(config: CellConfig, scene: "SceneConfig | None") -> CellConfig:
-    """The config with the scene's own `least_speed`, where it has one and the config leaves the general one as it is."""
-    own, general = None if scene is None else scene.limits.least_speed, MotionConfig().least_speed
-    if own is None or config.motion.least_speed != general:
-        return config
-    return replace(config, motion=replace(config.motion, least_speed=own))
-
-
-def load_toml(path: str | Path) -> dict[str, Any]:
-    """The tables of a TOML file.
-
-    Raises:
-        ConfigError: the file is missing, unreadable, not UTF-8 or not TOML (with the line).
-    """
-    try:
-        return tomllib.loads(Path(path).read_bytes().decode())
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file", path=str(path)) from None
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})", path=str(path)) from None
-    except (UnicodeDecodeError, ValueError, RecursionError) as error:
-        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
-        raise ConfigError(f"{path}: no TOML: {reason}", path=str(path)) from None
+    """The config with the scene's own `least_speed`, where it goes first; see `for_scene`."""
+    return replace(config, motion=for_scene(config, scene).motion)
 
 
 def load_scene(name: str | Path, overrides: Iterable[str] = ()) -> "SceneConfig":
@@ -126,47 +145,56 @@ def load_scene(name: str | Path, overrides: Iterable[str] = ()) -> "SceneConfig"
     Raises:
         SceneError: an unknown name, or no such file.  ConfigError: a file that is no scene.
     """
-    from weldsim.scene.config import SceneConfig  # a plan never needs it
+    from weldsim.scene.config import SceneConfig, refuse_idle  # a plan never needs it
     from weldsim.scene.files import anchored, scene_path
 
     path = scene_path(name)
-    tables = anchored(apply_overrides(load_toml(path), overrides), path.parent)
-    return structure({"name": path.stem, **tables}, SceneConfig, where=str(name))
+    tables, given = with_sources(load_toml(path), Source("scene", path.stem), overrides)
+    tables = {"name": path.stem, **anchored(tables, path.parent)}
+    scene = replace(_structured(tables, SceneConfig, str(name), given), given=given)
+    refuse_idle(scene)
+    return scene
 
 
 def load_config(path: str | Path | None = None, overrides: Iterable[str] = ()) -> CellConfig:
     """The cell's config from a TOML file (or the defaults) with `key=value` overrides. Raises ConfigError."""
-    data = apply_overrides({} if path is None else load_toml(path), overrides)
-    return structure(data, CellConfig, where="config" if path is None else str(path))
+    tables, given = with_sources({} if path is None else load_toml(path), Source("file", str(path)), overrides)
+    return replace(_structured(tables, CellConfig, "config" if path is None else str(path), given), given=given)
 
 
-def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """A copy of `data` with every `dotted.key=value` set; the value is TOML if it reads as such, else plain text.
-
-    Raises:
-        ConfigError: no `=`, an empty key, or a key that leads through a value.
-    """
-    result: dict[str, Any] = deepcopy(dict(data))
-    for text in overrides:
-        key, equals, value = text.partition("=")
-        parts = [part.strip() for part in key.split(".")]
-        if not equals or not all(parts):
-            raise ConfigError(f"override {text!r}: write dotted.key=value, seam.method=thesis say", value=text)
-        table = result
-        for depth, part in enumerate(parts[:-1]):
-            table = table.setdefault(part, {})
-            if not isinstance(table, dict):
-                raise ConfigError(f"override {text!r}: {'.'.join(parts[: depth + 1])} is a value, not a table", value=text)
-        table[parts[-1]] = _toml_value(value.strip())
-    return result
-
-
-def _toml_value(text: str) -> Any:
+def _structured(tables: Mapping[str, Any], cls: type[Config], where: str, given: Given) -> Config:
+    """`structure`; where it refuses, with what was surely meant."""
     try:
-        parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        return text
-    return parsed["value"] if list(parsed) == ["value"] else text
+        return structure(tables, cls, where=where)
+    except ConfigError as error:
+        key, limit = str(error.data.get("key", "")), error.data.get("limit")
+        more = ""
+        if "unknown" in error.data:
+            more = _meant(key, cls, given)
+        elif isinstance(limit, tuple) and "unit" in error.data:
+            more = units.meant(value_at(tables, key), str(error.data["unit"]), *limit)
+        if not more:
+            raise
+        fault, mark, allowed = str(error).partition("; allowed")
+        raise ConfigError(f"{fault.partition('; did you mean')[0]}; {more}{mark}{allowed}", **error.data) from None
+
+
+def _meant(key: str, cls: type, given: Given) -> str:
+    """Which setting is meant by the unknown `key`, of this kind of config or of the other; "" where none is near."""
+    from weldsim.scene.config import SceneConfig
+
+    lead = "" if cls is CellConfig else SCENE
+    written, source = next(((k, v) for k, v in given.items() if k == key or k.startswith(f"{key}.")), (key, DEFAULT))
+    found = meant_keys(lead + written, [*keys(CellConfig), *(SCENE + one for one in keys(SceneConfig))])
+    if not found:
+        return ""
+    if source.kind != "command line":
+        found = [one for one in found if one.startswith(SCENE) is (cls is SceneConfig)] or found
+        if found[0].startswith(SCENE) is not (cls is SceneConfig):
+            home = "a scene's: it belongs in the scene's file" if lead == "" else "the cell's: it belongs in a --config file"
+            return f"{found[0].removeprefix(SCENE)} is {home}"
+        found = [one.removeprefix(lead) for one in found]
+    return f"did you mean {' or '.join(found[:MOST_MEANT])}?"
 
 
 def digest(config: Any) -> str:

@@ -31,7 +31,12 @@ def require_within(config: object, ranges: Mapping[str, tuple[float, float]], ta
         value = getattr(config, name)
         if not low <= value <= high:
             key = f"{table}.{name}".lstrip(".")
-            unit = "".join(f" {name}" for name in get_args(get_type_hints(type(config), include_extras=True)[name])[1:2])
+            units = get_args(get_type_hints(type(config), include_extras=True)[name])[1:2]
+            unit = "".join(f" {name}" for name in units)
             raise ConfigError(
-                f"{key} = {value:g}{unit} is outside {low:g} to {high:g}{unit}", key=key, value=value, limit=(low, high)
+                f"{key} = {value:g}{unit} is outside {low:g} to {high:g}{unit}",
+                key=key,
+                value=value,
+                limit=(low, high),
+                **({"unit": units[0]} if units else {}),
             )

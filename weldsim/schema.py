@@ -20,12 +20,14 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from cattrs import AttributeValidationNote, ClassValidationError, Converter, IterableValidationError, IterableValidationNote
 from cattrs.errors import ForbiddenExtraKeysError
-from cattrs.gen import make_dict_structure_fn
+from cattrs.gen import make_dict_structure_fn, make_dict_unstructure_fn, override
 
 from weldsim import units
 from weldsim.errors import ConfigError, WeldsimError
 
 Config = TypeVar("Config")
+HIDDEN = {"hidden": True}
+"""Metadata of a dataclass field that is no setting: neither read nor written."""
 
 
 def structure(data: Mapping[str, Any], cls: type[Config], *, where: str = "config") -> Config:
@@ -52,6 +54,21 @@ def to_json(config: Any) -> dict[str, Any]:
     return json.loads(json.dumps(CONVERTER.unstructure(config), default=str))
 
 
+def settings(cls: Any) -> list[Any]:
+    """The fields of the config dataclass `cls` that are settings."""
+    return [entry for entry in fields(cls) if not entry.metadata.get("hidden")]
+
+
+def keys(cls: type, prefix: str = "") -> list[str]:
+    """Dotted key of every setting of `cls` and of the tables inside it, in order; an array of tables is one setting."""
+    found, hints = [], get_type_hints(cls, include_extras=True)
+    for entry in settings(cls):
+        inner = next((part for part in _parts(hints[entry.name]) if isinstance(part, type) and is_dataclass(part)), None)
+        array = any(get_origin(part) is tuple for part in _parts(hints[entry.name]))
+        found += [prefix + entry.name] if inner is None or array else keys(inner, f"{prefix}{entry.name}.")
+    return found
+
+
 @dataclass(frozen=True, kw_only=True)
 class FieldDoc:
     """One line of help. Attributes: key (dotted), type, default and unit as text, doc (one paragraph)."""
@@ -66,7 +83,7 @@ class FieldDoc:
 def describe(cls: type, *, prefix: str = "") -> list[FieldDoc]:
     """Every field of the config dataclass `cls` and of those inside it, in order, with its documentation."""
     hints, docs, lines = get_type_hints(cls, include_extras=True), _field_docs(cls), []
-    for entry in fields(cls):
+    for entry in settings(cls):
         key, hint = prefix + entry.name, hints[entry.name]
         inner = next((part for part in _parts(hint) if isinstance(part, type) and is_dataclass(part)), None)
         if inner is not None and inner is hint:
@@ -211,7 +228,8 @@ def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
 
 def _table_hook(cls: Any) -> Callable[[Any, Any], Any]:
     """The structuring function of the dataclass `cls`: cattrs' own, behind a check that a table was given."""
-    inner: Any = make_dict_structure_fn(cls, CONVERTER, _cattrs_forbid_extra_keys=True, _cattrs_detailed_validation=True)
+    omitted = _omitted(cls)
+    inner: Any = make_dict_structure_fn(cls, CONVERTER, _cattrs_forbid_extra_keys=True, _cattrs_detailed_validation=True, **omitted)
 
     def structure_table(value: Any, kind: Any) -> Any:
         if isinstance(value, cls):
@@ -221,6 +239,15 @@ def _table_hook(cls: Any) -> Callable[[Any, Any], Any]:
         return inner(value, kind)
 
     return structure_table
+
+
+def _omitted(cls: Any) -> Any:
+    """What tells cattrs to leave hidden fields alone."""
+    return {entry.name: override(omit=True) for entry in fields(cls) if entry.metadata.get("hidden")}
+
+
+def _table_dumper(cls: Any) -> Callable[[Any], Any]:
+    return make_dict_unstructure_fn(cls, CONVERTER, **_omitted(cls))
 
 
 def _faults(error: BaseException, path: str) -> Iterable[tuple[str, dict[str, Any]]]:
@@ -235,11 +262,14 @@ def _faults(error: BaseException, path: str) -> Iterable[tuple[str, dict[str, An
         for inner in error.exceptions:
             yield from _faults(inner, path)
     elif isinstance(error, ForbiddenExtraKeysError):
-        allowed = [entry.name for entry in fields(error.cl)]
+        allowed = [entry.name for entry in settings(error.cl)]
         for key in sorted(map(str, error.extra_fields)):
             dotted = f"{path}.{key}".lstrip(".")
             hint = _nearest(key, allowed)
-            yield f"unknown key {dotted!r}{hint}; allowed: {', '.join(allowed)}", {"key": dotted, "allowed": allowed}
+            yield (
+                f"unknown key {dotted!r}{hint}; allowed: {', '.join(allowed)}",
+                {"key": dotted, "allowed": allowed, "unknown": True},
+            )
     elif isinstance(error, KeyError):
         dotted = f"{path}.{error.args[0]}".lstrip(".") if not path.endswith(str(error.args[0])) else path
         yield f"key {dotted!r} is missing", {"key": dotted}
@@ -269,6 +299,7 @@ def _make_converter() -> Converter:
     converter.register_structure_hook_func(_is_union, _union)
     converter.register_structure_hook_func(_is_quantity, _quantity)
     converter.register_structure_hook_factory(is_dataclass, _table_hook)
+    converter.register_unstructure_hook_factory(is_dataclass, _table_dumper)
     return converter
 
 

@@ -10,7 +10,7 @@ from weldsim.errors import ConfigError
 
 _SCALES: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
-    "rad": {"rad": 1.0, "deg": math.pi / 180, "mrad": 1e-3},
+    "rad": {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180, "mrad": 1e-3},
     "s": {"s": 1.0, "ms": 1e-3, "min": 60.0},
     "m/s": {"m/s": 1.0, "mm/s": 1e-3, "cm/min": 1e-2 / 60, "mm/min": 1e-3 / 60},
     "rad/m": {"rad/m": 1.0, "deg/mm": math.pi / 180 * 1e3, "deg/m": math.pi / 180},
@@ -20,7 +20,10 @@ _SCALES: dict[str, dict[str, float]] = {
 DIMENSIONS = frozenset(_SCALES)
 """The SI units a quantity can be declared in."""
 
-_NUMBER_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z/]*)\s*")
+COMMON = {"m": ("mm", "cm"), "rad": ("deg",), "s": ("ms",), "m/s": ("mm/s", "mm/min"), "rad/m": ("deg/mm",), "rad/s": ("deg/s",)}
+"""Units in which welders write these, the commonest first."""
+
+_NUMBER_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z/°]*)\s*")
 
 
 def parse(value: object, dimension: str, *, where: str = "value") -> float:
@@ -49,6 +52,29 @@ def parse(value: object, dimension: str, *, where: str = "value") -> float:
     if not math.isfinite(number):
         raise ConfigError(f"{where}: {value!r} is not finite", value=value)
     return number
+
+
+def meant(value: object, dimension: str, low: float, high: float) -> str:
+    """What a bare number that lies outside low to high [SI] was meant as, '"90 deg" is meant?'; "" for text with a unit, or where
+    no common unit brings it inside."""
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        return ""
+    match = _NUMBER_UNIT.fullmatch(str(value))
+    if match is None or match[2]:
+        return ""
+    fitting = (unit for unit in COMMON.get(dimension, ()) if low <= float(match[1]) * _SCALES[dimension][unit] <= high)
+    unit = next(fitting, None)
+    return "" if unit is None else f'"{match[1]} {unit}" is meant?'
+
+
+def written(value: float, dimension: str) -> tuple[str, str]:
+    """The number and the unit with which welders write an SI value; `parse` reads the two together as the same value."""
+    for unit in (*COMMON.get(dimension, ())[:1], dimension):
+        for digits in (12, 17):
+            number = f"{value / _SCALES[dimension][unit]:.{digits}g}"
+            if float(number) * _SCALES[dimension][unit] == value:
+                return number, unit
+    return repr(value), dimension
 
 
 def length_scale(unit: str) -> float:

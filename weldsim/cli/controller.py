@@ -9,6 +9,7 @@ from typing import Annotated, Literal, get_args
 import tyro
 
 from weldsim.cli.options import SCENE_PREFIX, ConfigOptions
+from weldsim.cli.quantities import PACE, SPELL, quantity
 from weldsim.cli.show import print_json
 from weldsim.controller.fault_names import FaultName
 from weldsim.errors import InputError
@@ -41,19 +42,19 @@ class Controller(ConfigOptions):
     """Factory calibration of the arm, a controller's calibration.conf: what the arm tells of itself on port 30001, and how poses
     and joint angles belong together. A nominal UR5 by default."""
 
-    speed: float = 1.0
+    speed: Annotated[float, quantity(PACE, "--speed")] = 1.0
     """Simulated seconds in a second."""
 
     host: str = "127.0.0.1"
     """Address to serve or to ask. The protocols know no password: an address that others can reach lets them move the arm."""
 
-    seconds: float = 1.0
+    seconds: Annotated[float, quantity(SPELL, "--seconds")] = 1.0
     """With fault stall and link-drop: how long."""
 
     low_when_stopped: tuple[int, ...] = (0,)
     """Digital outputs that are dropped when no program runs any longer, the arc's say."""
 
-    unlock_delay: float = 5.0
+    unlock_delay: Annotated[float, quantity(SPELL, "--unlock-delay")] = 5.0
     """Seconds after a protective stop before the dashboard can unlock it, as on a real controller."""
 
     verbose: bool = False

@@ -2,16 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import numpy as np
 import tyro
 
 from weldsim import units
 from weldsim.cli.options import ConfigOptions, choose_platform, refuse_together
 from weldsim.cli.outputs import check_outputs, check_suffix
+from weldsim.cli.quantities import JOINTS, LEANED, MOVED, TURNED, WELD_SPEED, quantities, quantity
 from weldsim.cli.show import print_json, progress, table
-from weldsim.dryrun.program import Base, Tool
+from weldsim.dryrun.names import Base, Tool
 from weldsim.errors import InputError, SensorError
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ class DryRunCommand(ConfigOptions):
     Exits 1 when it would fail.
     """
 
+    reads: ClassVar[tuple[str, ...]] = ("twin", "path", "motion", "execution", "report")  # a job's settings may be handed on
+
     file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
     """A path (weldsim.path/1, .json), UR poses (.csv: x y z rx ry rz) or URScript (.script)."""
 
@@ -41,7 +43,7 @@ class DryRunCommand(ConfigOptions):
     empty: bool = False
     """Arm and table alone (the default)."""
 
-    start: str | None = None
+    start: Annotated[tuple[float, ...] | None, quantities(JOINTS, "--start")] = None
     """Where the arm stands: six joint angles, "-90 deg, -75 deg, ..." or radians. Default: the scene's last view, or home."""
 
     arm: Path | None = None
@@ -57,16 +59,16 @@ class DryRunCommand(ConfigOptions):
     roll: bool = False
     """Leave the rotation about the wire of a CSV's poses free."""
 
-    turn: str | None = None
+    turn: Annotated[float | None, quantity(TURNED, "--turn")] = None
     """Turn the torch about its wire first, "-15 deg" say, at every pose; fixes are told in such options."""
 
-    lean: str | None = None
+    lean: Annotated[tuple[float, ...] | None, quantities(LEANED, "--lean")] = None
     """Lean the torch first: added work angle and travel angle, "5 deg, 0 deg"."""
 
-    move: str | None = None
+    move: Annotated[tuple[float, ...] | None, quantities(MOVED, "--move")] = None
     """Move part, fixture and job first, along x and y of the base: "20 mm, -35 mm"."""
 
-    speed: str | None = None
+    speed: Annotated[float | None, quantity(WELD_SPEED, "--speed")] = None
     """Weld at this speed at most: "5 mm/s"."""
 
     no_fix: bool = False
@@ -96,7 +98,7 @@ class DryRunCommand(ConfigOptions):
         check_suffix(self.reach_map, (".png",), "a reach map")
         check_suffix(self.export, (".script", ".urscript"), "a program")
         check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file, self.arm))
-        config, q_start = self.cell(), None if self.start is None else joint_angles(self.start)
+        config = self.cell()
         change = self._change()
 
         from weldsim.config import paced_for
@@ -105,7 +107,7 @@ class DryRunCommand(ConfigOptions):
         from weldsim.dryrun.run import dry_run
 
         config = paced_for(config, None if self.scene is None else self.scene_of(self.scene))
-        cell = self._cell(q_start)
+        cell = self._cell()
         program = read_program(
             self.file,
             tool=self.tool,
@@ -139,18 +141,19 @@ class DryRunCommand(ConfigOptions):
         return 0 if result.passed else 1
 
     def _change(self) -> "Change":
+        import numpy as np
+
         from weldsim.dryrun.change import Change
 
-        return Change(
-            turn=None if self.turn is None else float(_quantities(self.turn, "rad", 1, "--turn")[0]),
-            lean=None if self.lean is None else _quantities(self.lean, "rad", 2, "--lean"),
-            move=None if self.move is None else _quantities(self.move, "m", 2, "--move"),
-            speed=None if self.speed is None else float(_quantities(self.speed, "m/s", 1, "--speed")[0]),
-        )
+        lean, move = (None if given is None else np.array(given) for given in (self.lean, self.move))
+        return Change(turn=self.turn, lean=lean, move=move, speed=self.speed)
 
-    def _cell(self, q_start: Any) -> "Cell":
+    def _cell(self) -> "Cell":
+        import numpy as np
+
         from weldsim.dryrun.cell import empty_cell, scene_cell
 
+        q_start = None if self.start is None else np.array(self.start)
         cell = empty_cell(q_start) if self.scene is None else scene_cell(self.scene_of(self.scene), q_start)
         return cell if self.arm is None else cell.fitted(self._arm(self.arm))
 
@@ -205,6 +208,8 @@ class DryRunCommand(ConfigOptions):
 
     def _export(self, result: "DryRun", cell: "Cell", config: "MotionConfig") -> Path:
         """All welds one after the other, from the start and back; they may also begin where arms wait, if that way is clear."""
+        import numpy as np
+
         from weldsim.execution.urscript import script_text
         from weldsim.motion.sweep import touched
         from weldsim.output import write_whole
@@ -271,24 +276,3 @@ def _row(first: "Verdict", last: "Verdict") -> list[str]:
     """One line of the table of failures."""
     span = first.label if first.index == last.index else f"{first.label} to {last.index}"
     return [span, "" if first.s is None else f"{units.to_mm(first.s):.1f} mm", first.why, first.text]
-
-
-def _quantities(text: str, dimension: str, count: int, option: str) -> Any:
-    """Numbers (count,) in SI from text such as "20 mm, -35 mm". Raises InputError."""
-    parts = [part.strip() for part in text.replace(";", ",").split(",")]
-    if len(parts) != count:
-        raise InputError(f"{option} {text!r}: {len(parts)} values, {count} needed, separated by commas", value=text)
-    values = []
-    for part in parts:
-        try:
-            values.append(float(part))
-        except ValueError:
-            values.append(units.parse(part, dimension, where=option))
-    if not np.isfinite(values).all():
-        raise InputError(f"{option} {text!r}: a value is not finite", value=text)
-    return np.array(values)
-
-
-def joint_angles(text: str) -> Any:
-    """Six joint angles [rad] from text. Raises InputError."""
-    return _quantities(text, "rad", 6, "--start")

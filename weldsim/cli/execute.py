@@ -3,7 +3,7 @@
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
@@ -11,6 +11,7 @@ from weldsim import units
 from weldsim.cli.dry_run import failures
 from weldsim.cli.options import ConfigOptions
 from weldsim.cli.outputs import check_folder, nearest_folder
+from weldsim.cli.quantities import SHARE, quantity
 from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
 from weldsim.cli.signals import INTERRUPTED, interrupted_once
 from weldsim.errors import InputError
@@ -36,6 +37,8 @@ class Execute(ConfigOptions):
     stops the arm, keeps its log too, and exits 130.
     """
 
+    reads: ClassVar[tuple[str, ...]] = ("twin", "path", "motion", "execution", "report")
+
     file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
     """A path (weldsim.path/1, .json) or UR poses (.csv: x y z rx ry rz)."""
 
@@ -51,7 +54,7 @@ class Execute(ConfigOptions):
     arc: bool = False
     """Let the arc burn on the weld. Without it the same motion is made with the arc off."""
 
-    speed_scale: float = 1.0
+    speed_scale: Annotated[float, quantity(SHARE, "--speed-scale")] = 1.0
     """Share of the planned pace, over 0 to 1: 0.1 takes ten times as long."""
 
     seam: int = 1

@@ -2,14 +2,14 @@
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-import numpy as np
 import tyro
 
 from weldsim import units
 from weldsim.cli.options import ConfigOptions, Method, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, nearest_folder
+from weldsim.cli.quantities import COUNT, POINT, quantities, quantity
 from weldsim.cli.show import Tell, progress, table, times
 from weldsim.errors import CloudError, InputError, NoSeamError, PathError
 
@@ -30,11 +30,13 @@ class Plan(ConfigOptions):
     --out nothing is written and a summary is printed.
     """
 
+    reads: ClassVar[tuple[str, ...]] = ("cloud", "seam", "path", "report")
+
     cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="CLOUD")]
     """File with the cloud, or with a depth image (16-bit PNG, NPY)."""
 
-    viewpoint: tuple[float, float, float] | None = None
-    """Where the camera stood [m]; by default what the file says."""
+    viewpoint: Annotated[tuple[float, float, float] | None, quantities(POINT, "--viewpoint", words=3)] = None
+    """Where the camera stood: metres, or each with its unit, "-750 mm" say; by default what the file says."""
 
     units: Literal["m", "cm", "mm", "in"] | None = None
     """Unit of length of the cloud; by default the one that its columns' names give, else metres."""
@@ -45,7 +47,7 @@ class Plan(ConfigOptions):
     pose: Path | None = None
     """Pose of that camera in the base, JSON; by default the base is where the camera is."""
 
-    depth_unit: str | None = None
+    depth_unit: Annotated[float | None, quantity(COUNT, "--depth-unit")] = None
     """Length of one count of a depth image, "1 mm" by default."""
 
     method: Method | None = None
@@ -54,8 +56,8 @@ class Plan(ConfigOptions):
     seam: int | None = None
     """Which seam, counted from 1, the best one; by default all."""
 
-    near: tuple[float, float, float] | None = None
-    """The seam nearest to this point [m]."""
+    near: Annotated[tuple[float, float, float] | None, quantities(POINT, "--near", words=3)] = None
+    """The seam nearest to this point: metres, or each with its unit."""
 
     out: Path | None = None
     """Where to write the path as JSON, schema weldsim.path/1."""
@@ -155,13 +157,13 @@ class Plan(ConfigOptions):
             box = config.cloud
             crop = None if box.crop_min is None or box.crop_max is None else (box.crop_min, box.crop_max)
             return read_cloud(self.cloud, unit=self.units, viewpoint=self.viewpoint, crop=crop)
-        count = units.parse(self.depth_unit or "1 mm", "m", where="--depth-unit")
-        if not count > 0:
-            raise InputError(f"--depth-unit {self.depth_unit}: must be positive", depth_unit=self.depth_unit)
-        return deproject(read_depth_frame(self.cloud, self.intrinsics, pose=self.pose, depth_unit=count))
+        count = {} if self.depth_unit is None else {"depth_unit": self.depth_unit}
+        return deproject(read_depth_frame(self.cloud, self.intrinsics, pose=self.pose, **count))
 
     def _chosen(self, result: "PlanResult") -> "tuple[PlanResult, tuple[int, ...]]":
         """The result with the seams that were asked for alone, and their numbers."""
+        import numpy as np
+
         from weldsim.pipeline import pick
 
         findings = result.findings
@@ -219,6 +221,8 @@ class Plan(ConfigOptions):
         write_png(picture, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
 
     def _print_json(self, document: dict[str, Any], result: "PlanResult") -> None:
+        import numpy as np
+
         from weldsim.path.files import path_text
 
         threshold = result.findings.threshold
@@ -231,6 +235,8 @@ class Plan(ConfigOptions):
     def _print(
         self, chosen: "PlanResult", numbers: tuple[int, ...], result: "PlanResult", clock: "Clock", page: Path | None
     ) -> None:
+        import numpy as np
+
         from weldsim.pipeline import unplanned
 
         found, method = len(result.findings.seams), chosen.findings.method

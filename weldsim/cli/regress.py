@@ -11,7 +11,8 @@ from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, Method, choose_plat
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
-from weldsim.sensor.choose import SensorName
+from weldsim.sensor.names import SensorName
+from weldsim.settings import key_of
 
 if TYPE_CHECKING:
     from weldsim.regression import Golden, Regression
@@ -75,6 +76,8 @@ class Regress(ConfigOptions):
         from weldsim.regression.figures import CHAOTIC
 
         path = self.golden or default_golden()
+        if "seam.method" in map(key_of, self.set):
+            raise InputError("--set seam.method: each of --methods runs in its turn; did you mean --methods?")
         self._check(path)
         golden = self._golden(path)
         config = self.cell()

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
+from weldsim.cli.quantities import POINT, quantities
 from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
 from weldsim.errors import InputError, SensorError
-from weldsim.sensor.choose import SensorName
+from weldsim.sensor.names import SensorName
 
 if TYPE_CHECKING:
     from weldsim.jobs import RunResult
@@ -38,8 +39,8 @@ class Run(ConfigOptions):
     seam: int | Literal["all"] | None = None
     """Which seam to weld, counted from 1, the best one (the default); `all` welds every one, one after the other."""
 
-    near: tuple[float, float, float] | None = None
-    """Weld the seam nearest to this point in the base [m]."""
+    near: Annotated[tuple[float, float, float] | None, quantities(POINT, "--near", words=3)] = None
+    """Weld the seam nearest to this point in the base: metres, or each with its unit, "-450 mm" say."""
 
     video: Path | None = None
     """Where to write a film of the weld, MP4."""

@@ -2,13 +2,13 @@
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress
 from weldsim.errors import InputError
-from weldsim.sensor.choose import SensorName, depth_step
+from weldsim.sensor.names import SensorName
 
 CLOUDS = (".ply", ".npz", ".xyz", ".txt")
 
@@ -16,6 +16,8 @@ CLOUDS = (".ply", ".npz", ".xyz", ".txt")
 @dataclass(frozen=True, kw_only=True)
 class Scan(ConfigOptions):
     """Let the twin scan a scene, and write what the camera saw as `weldsim plan` reads it."""
+
+    reads: ClassVar[tuple[str, ...]] = ("twin", "sensor", "stereo", "kinect", "cloud", "scan", "motion", "execution")
 
     scene: SceneName
     """Name of a scene (`weldsim scenes`), or a TOML file."""
@@ -41,6 +43,7 @@ class Scan(ConfigOptions):
     def __call__(self) -> int:
         """0."""
         from weldsim.cloud.depth_output import depth_file_names
+        from weldsim.sensor.choose import depth_step
 
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: 0 or more is needed", seed=self.seed)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import tyro
 
@@ -10,6 +10,7 @@ from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
+from weldsim.settings import load_toml
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, kw_only=True)
 class Scenes(ConfigOptions):
     """List the scenes that come with weldsim, draw one, `weldsim scenes show curve`, or export one as plain MJCF."""
+
+    reads: ClassVar[tuple[str, ...]] = ()
 
     action: tyro.conf.Positional[Literal["list", "show", "export"]] = "list"
     """List all, draw one, or export one."""
@@ -34,11 +37,13 @@ class Scenes(ConfigOptions):
         return {"list": self._list, "show": self._show, "export": self._export}[self.action]()
 
     def _list(self) -> int:
-        from weldsim.scene.files import scene_names
+        from weldsim.scene.files import scene_names, scene_path
 
         if self.scene or self.out is not None:
             raise InputError("scenes list: takes neither a scene nor --out; did you mean scenes show?")
-        titles = {name: self.scene_of(name).title for name in scene_names()}
+        if self.set or self.config is not None:
+            raise InputError("scenes list: takes neither --set nor --config; did you mean scenes show?")
+        titles = {name: str(load_toml(scene_path(name)).get("title", "")) for name in scene_names()}
         if self.json:
             print_json({"scenes": [{"name": name, "title": title} for name, title in titles.items()]})
         else:
@@ -72,6 +77,7 @@ class Scenes(ConfigOptions):
         """The scene that is meant, and where to write. Raises InputError, SceneError, OutputError."""
         if not self.scene:
             raise InputError(f"scenes {self.action}: give a scene")
+        self.cell()  # nothing of it is used: what is set there is refused
         scene = self.scene_of(self.scene)
         out = self.out or Path(f"{Path(self.scene).stem}{suffix}")
         check_suffix(out, (suffix,), what)

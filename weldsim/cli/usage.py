@@ -1,55 +1,138 @@
-"""From words on the command line to a command ready to run; what tyro has to say in one line."""
+"""From words on the command line to a command ready to run; what tyro has to say in one line, and what was meant."""
 
 import contextlib
 import io
 import re
-from collections.abc import Callable, Sequence
-from itertools import groupby
+import shlex
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
+from importlib import import_module
+from itertools import groupby, pairwise
+from typing import Any
 
 import tyro
 
-from weldsim.cli.controller import Controller
-from weldsim.cli.doctor import Doctor
-from weldsim.cli.dry_run import DryRunCommand
-from weldsim.cli.execute import Execute
-from weldsim.cli.plan import Plan
-from weldsim.cli.regress import Regress
-from weldsim.cli.run import Run
-from weldsim.cli.scan import Scan
-from weldsim.cli.scenes import Scenes
 from weldsim.errors import InputError
+from weldsim.settings import nearest
 
-COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
-    "plan": Plan,
-    "run": Run,
-    "scan": Scan,
-    "dry-run": DryRunCommand,
-    "execute": Execute,
-    "scenes": Scenes,
-    "regress": Regress,
-    "controller": Controller,
-    "doctor": Doctor,
+Command = Callable[[], int]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A command before it is loaded. Attributes: module and name of its class; about, the first sentence of its help."""
+
+    module: str
+    name: str
+    about: str
+
+    def load(self) -> Any:
+        """The class."""
+        return getattr(import_module(f"weldsim.cli.{self.module}"), self.name)
+
+
+COMMANDS: dict[str, Entry] = {
+    "plan": Entry("plan", "Plan", "Find the groove in a scan and plan the torch path along it."),
+    "run": Entry("run", "Run", "Scan, plan and weld a workpiece in the twin, and judge the weld against the true seam."),
+    "scan": Entry("scan", "Scan", "Let the twin scan a scene, and write what the camera saw as `weldsim plan` reads it."),
+    "dry-run": Entry(
+        "dry_run",
+        "DryRunCommand",
+        "Check a path or robot program before anything moves: a verdict per waypoint, what would help, cycle time.",
+    ),
+    "execute": Entry("execute", "Execute", "Weld a path with a robot, the twin's or a real one, through the safety gate."),
+    "scenes": Entry(
+        "scenes",
+        "Scenes",
+        "List the scenes that come with weldsim, draw one, `weldsim scenes show curve`, or export one as plain MJCF.",
+    ),
+    "config": Entry("settings", "Config", "Show every setting with its value, its unit and where the value comes from."),
+    "regress": Entry(
+        "regress", "Regress", "Hold every scene's figures against recorded ones, and say which are worse, where and by how much."
+    ),
+    "controller": Entry(
+        "controller",
+        "Controller",
+        "Serve a virtual UR5 controller: dashboard 29999, scripts 30001 to 30003, RTDE 30004. Ends with Ctrl-C.",
+    ),
+    "doctor": Entry(
+        "doctor",
+        "Doctor",
+        "Try every library, the rendering back end and write access, and say what to install where something fails.",
+    ),
 }
 DESCRIPTION = "Simulation-first digital twin of a vision-guided arc-welding cell. `weldsim --version` prints the version."
+HELP = ("-h", "--help")
 
+MEANT_COMMANDS = {
+    **dict.fromkeys(("weld", "simulate", "sim", "twin", "demo", "start"), "run"),
+    **dict.fromkeys(("check", "verify", "validate", "dryrun", "dry", "reach"), "dry-run"),
+    **dict.fromkeys(("show", "draw", "view", "display", "picture"), "scenes show"),
+    **dict.fromkeys(("export", "mjcf"), "scenes export"),
+    **dict.fromkeys(("list", "ls", "parts", "workpieces"), "scenes"),
+    **dict.fromkeys(("settings", "set", "configure", "options"), "config"),
+    **dict.fromkeys(("find", "detect", "seam", "path"), "plan"),
+    **dict.fromkeys(("capture", "see", "look", "camera"), "scan"),
+    **dict.fromkeys(("robot", "send", "play"), "execute"),
+    **dict.fromkeys(("test", "compare", "bench", "benchmark", "regression"), "regress"),
+    **dict.fromkeys(("serve", "server", "ursim"), "controller"),
+    **dict.fromkeys(("fault",), "controller fault"),
+    **dict.fromkeys(("diagnose", "install", "info"), "doctor"),
+    **dict.fromkeys(("version", "v"), "--version"),
+    "help": "--help",
+}
+"""What people say for a command."""
+
+MEANT_OPTIONS = {
+    **dict.fromkeys(("output", "outfile", "output-dir", "out-dir", "folder", "dir", "o", "save"), ("out",)),
+    **dict.fromkeys(("camera",), ("sensor",)),
+    **dict.fromkeys(("finder", "algorithm"), ("method", "methods")),
+    **dict.fromkeys(("film", "movie", "mp4"), ("video",)),
+    **dict.fromkeys(("page",), ("report", "html")),
+    **dict.fromkeys(("unit",), ("units",)),
+    **dict.fromkeys(("settings", "setting", "param", "s"), ("set",)),
+    **dict.fromkeys(("file", "c", "cfg", "settings-file"), ("config",)),
+    **dict.fromkeys(("ip", "address", "robot-ip"), ("host",)),
+    **dict.fromkeys(("scale", "slow"), ("speed-scale",)),
+    **dict.fromkeys(("n", "count", "repeat"), ("seeds",)),
+    **dict.fromkeys(("j", "workers", "processes", "threads"), ("jobs",)),
+}
+"""What people say for an option."""
+
+SUFFIXES = {
+    "run": (".toml",),
+    "plan": (".ply", ".pcd", ".xyz", ".npz", ".npy"),
+    "dry-run": (".json", ".csv", ".script", ".urscript"),
+}
+"""What the files of a command end in."""
+
+_CHOICE = re.compile(r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)")
+_NUMBER = re.compile(r"error parsing (\S+): .*(?:int\(\)|float|INT|FLOAT).*(?:: '|\[')(.*)'")
+_MISSING = re.compile(r"missing value for argument '(\S+)'\. Expected (\d+) values")
 _FRAME = re.compile(r"[│╭╮╰╯║|]")
 _RULE = re.compile(r"[─━-]{4,}")
 
 
-def parse(words: Sequence[str]) -> Callable[[], int] | int:
+def parse(words: Sequence[str]) -> Command | int:
     """The command, or 0 where help was asked for and has been printed.
 
     Raises:
         InputError: words that make no command; one line.
     """
-    said = io.StringIO()
+    if words and words[0] in HELP:
+        print(overview(), end="")
+        return 0
+    name = words[0] if words else ""
+    if name not in COMMANDS:
+        raise InputError(f"{_no_command(words)}; see weldsim --help", words=list(words))
+    command, said = COMMANDS[name].load(), io.StringIO()
+    _check_options(name, command, words[1:])
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
-                prog="weldsim",
-                description=DESCRIPTION,
-                args=list(words),
+            return tyro.cli(
+                command,
+                prog=f"weldsim {name}",
+                args=list(words[1:]),
                 config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone, tyro.conf.OmitArgPrefixes),
             )
     except SystemExit as ending:
@@ -58,15 +141,137 @@ def parse(words: Sequence[str]) -> Callable[[], int] | int:
         raise InputError(one_line(said.getvalue(), words), words=list(words)) from None
 
 
+def overview() -> str:
+    """What `weldsim --help` prints."""
+    width = max(map(len, COMMANDS))
+    rows = [f"  {name.ljust(width)}  {entry.about}" for name, entry in COMMANDS.items()]
+    return "\n".join(["usage: weldsim COMMAND ...", "", DESCRIPTION, "", *rows, "", "`weldsim COMMAND --help` tells more.", ""])
+
+
 def one_line(box: str, words: Sequence[str]) -> str:
-    """What stands in the box that tyro draws: its first paragraph, its guess, and where to read more."""
+    """What stands in the box that tyro draws: its first paragraph, what was meant, and where to read more."""
     rows = [_FRAME.sub("", row).strip() for row in box.splitlines()[1:]]  # without the title
     groups = [[*group] for ruled, group in groupby(filter(None, rows), lambda row: _RULE.fullmatch(row) is not None) if not ruled]
     paragraphs = groups or [[]]
     asked = paragraphs[0][:2] if "Required options" in box else paragraphs[0]
     message = " ".join(asked).partition(" Got errors:")[0].rstrip(".:") or "these words make no command"
     message = re.sub(r"'None', ", "", message)
-    guesses = [" ".join(rows[1:2]) for rows in paragraphs[1:] if rows and rows[0].startswith("Perhaps")]
-    hint = f"; perhaps {guesses[0]}" if guesses else ""
     name = next((word for word in words[:1] if word in COMMANDS), "")
-    return " ".join(f"{message[:1].lower()}{message[1:]}{hint}; see weldsim {name} --help".split())
+    message = _said_better(f"{message[:1].lower()}{message[1:]}", name, words)
+    return " ".join(f"{message}; see weldsim {name} --help".split())
+
+
+def _said_better(message: str, name: str, words: Sequence[str]) -> str:
+    """tyro's message with what was meant, where that can be told."""
+    if match := _CHOICE.match(message):
+        wrong, where, choices = match[1], match[2], re.findall(r"'([^']*)'", match[3])
+        meant = _action_meant(wrong, words) if (name, where) == ("scenes", "action") else nearest(wrong, choices)
+        return f"{where} {wrong!r} is not one of {', '.join(choices)}{f'; did you mean {meant}?' if meant else ''}"
+    if match := _NUMBER.match(message):
+        whole = "whole " if "int()" in message or "INT" in message else ""
+        return f"{match[1]} {match[2]!r} is no {whole}number"
+    if match := _MISSING.match(message):
+        return f"{match[1]}: {'its value is' if match[2] == '1' else f'its {match[2]} values are'} missing"
+    if message.startswith("unrecognized options: "):
+        extra = message.removeprefix("unrecognized options: ").split(", ")
+        setting = next((one for one, after in pairwise(words) if "=" in one and after == extra[0]), None)
+        hint = f'; did you mean "{setting} {extra[0]}", in quotes?' if setting is not None else ""
+        return f"{' '.join(extra)}: {'one word' if len(extra) == 1 else f'{len(extra)} words'} too many{hint}"
+    return message
+
+
+def _action_meant(wrong: str, words: Sequence[str]) -> str:
+    """Which action of `weldsim scenes` is meant, with the scene."""
+    from weldsim.scene.files import scene_names
+
+    if wrong in scene_names() or wrong.endswith(".toml"):
+        return f"weldsim scenes show {wrong}"
+    meant = {"display": "show", "draw": "show", "view": "show", "picture": "show", "mjcf": "export", "save": "export"}
+    action = meant.get(wrong) or nearest(wrong, ("list", "show", "export"))
+    return f"weldsim scenes {' '.join(action if word == wrong else word for word in words[1:])}" if action else ""
+
+
+def _no_command(words: Sequence[str]) -> str:
+    """What to say where the first word is no command."""
+    if not words:
+        return f"a command is missing: expected one of {', '.join(COMMANDS)}"
+    name, rest = words[0], list(words[1:])
+    later = next((word for word in rest if word in COMMANDS), "")
+    if name.startswith("-") and later:
+        rest.remove(later)
+        return f"{name} stands before the command; did you mean {_command(later, [*rest, name])}?"
+    if own := _command_for(name):
+        kind = "a scene" if own == "run" else "a file"
+        return f"{name!r} is {kind}, no command; did you mean {_command(own, words)}?"
+    word = name.lower().replace("_", "-").lstrip("-")
+    meant = MEANT_COMMANDS.get(word) or next(filter(None, [nearest(word, COMMANDS)]), "")
+    if meant in ("run", "execute", "plan", "dry-run"):  # what stands behind it says which it can be
+        meant = next(filter(None, map(_command_for, rest)), meant) if meant != "dry-run" else meant
+        if meant == "dry-run" and word in ("weld", "robot", "send", "play"):
+            meant = "execute"
+    guess = f"; did you mean {_command(meant, rest)}?" if meant else f": expected one of {', '.join(COMMANDS)}"
+    return f"{name!r} is no command{guess}"
+
+
+def _command(name: str, words: Sequence[str]) -> str:
+    """The command as one would type it."""
+    needed = ["--robot", "sim"] if name == "execute" and "--robot" not in words else []
+    return " ".join(["weldsim", name, shlex.join([*words, *needed])]).rstrip()
+
+
+def _command_for(word: str) -> str:
+    """The command for a scene, a cloud, or a path or program; "" for any other word."""
+    from weldsim.scene.files import scene_names
+
+    if word in scene_names():
+        return "run"
+    return next((name for name, suffixes in SUFFIXES.items() if word.lower().endswith(suffixes)), "")
+
+
+def _check_options(name: str, command: Any, words: Sequence[str]) -> None:
+    """Raises InputError for an option that the command does not have; one line that names the one meant."""
+    known, positional, short = _options(command), _options(command, positional=True), _short(command)
+    for index, word in enumerate(words):
+        if word == "--":
+            return
+        option = word.lstrip("-").partition("=")[0].replace("_", "-")
+        if not word.startswith("-") or not option[:1].isalpha() or (word.startswith("--") and option in {*known, "help"}):
+            continue
+        if (not word.startswith("--") and word in short) or " " in word:
+            continue
+        if option in positional:
+            value = words[index + 1 : index + 2]
+            hint = f"it goes without one: weldsim {name} {' '.join(value) or option.upper()}"
+            raise InputError(f"weldsim {name}: {option} is no option; {hint}; see weldsim {name} --help", words=[word])
+        guess = [f"--{one}" for one in _meant_options(option, known)]
+        others = [] if guess else [other for other, entry in COMMANDS.items() if option in _options(entry.load())]
+        hint = f"; did you mean {' or '.join(guess)}?" if guess else ""
+        hint = hint or (f"; weldsim {' and '.join(others)} {'has' if len(others) == 1 else 'have'}" if others else "")
+        raise InputError(f"weldsim {name} has no option {word.partition('=')[0]}{hint}; see weldsim {name} --help", words=[word])
+
+
+def _meant_options(option: str, known: Iterable[str]) -> list[str]:
+    """Which of the known options is meant by an unknown one."""
+    known = sorted(known)
+    if found := [one for one in MEANT_OPTIONS.get(option, ()) if one in known]:
+        return found
+    plural = [one for one in known if one in (f"{option}s", option.removesuffix("s"))]
+    return plural or list(filter(None, [nearest(option, known)]))
+
+
+def _options(command: Any, *, positional: bool = False) -> set[str]:
+    """Names of the options of a command, or of what it takes without a name."""
+    return {one.name.replace("_", "-") for one in fields(command) if (tyro.conf.Positional in _marks(one.type)) is positional}
+
+
+def _short(command: Any) -> set[str]:
+    """Options of one letter."""
+    return {
+        "-h",
+        *(alias for one in fields(command) for mark in _marks(one.type) for alias in getattr(mark, "aliases", None) or ()),
+    }
+
+
+def _marks(hint: Any) -> tuple[Any, ...]:
+    """What a type is annotated with."""
+    return getattr(hint, "__metadata__", ())

@@ -6,12 +6,13 @@ from typing import Literal
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.dryrun.names import Base, Tool
 from weldsim.frames import Transform
 from weldsim.mounts import X_FT
 from weldsim.records import TorchPath
 
-Tool = Literal["torch", "tool0"]
-Base = Literal["controller", "base_link"]
+__all__ = ["Base", "Command", "Motion", "Program", "Tool"]
+
 Command = Literal["movej", "movel", "movep", "servoj"]
 
 

@@ -17,6 +17,8 @@ from weldsim.scene.workpieces.cylinder import CylinderConfig, make_cylinder
 from weldsim.scene.workpieces.groove import GrooveConfig
 from weldsim.scene.workpieces.plate import PlainPlate, PlateConfig, make_groove_plate
 from weldsim.scene.workpieces.user_mesh import MeshConfig, make_user_mesh
+from weldsim.schema import HIDDEN
+from weldsim.settings import Given
 
 __all__ = [
     "CameraPoseConfig",
@@ -146,6 +148,7 @@ class SceneConfig:
         material: how it looks.
         views: where the wrist camera scans from, in order; one at least.
         limits: of the verdict, in place of the general ones.
+        given: where each value came from that the scene's file or the command line gave; what is not in it is a default.
     """
 
     name: str = "scene"
@@ -163,6 +166,39 @@ class SceneConfig:
     material: MaterialConfig = field(default_factory=MaterialConfig)
     views: tuple[ViewConfig, ...] = (ViewConfig(),)
     limits: LimitsConfig = field(default_factory=LimitsConfig)
+    given: Given = field(default_factory=dict, compare=False, repr=False, metadata=HIDDEN)
+
+
+READS: dict[WorkpieceKind, tuple[str, ...]] = {
+    "plain_plate": ("plate",),
+    "groove_plate": ("plate", "groove", "centre_line"),
+    "cylinder": ("cylinder", "groove"),
+    "cuboid": ("cuboid", "groove"),
+    "y": ("plate", "groove", "branches"),
+    "mesh": ("mesh",),
+}
+"""The tables that make the shape of each kind of part."""
+SHAPES = {table for tables in READS.values() for table in tables}
+
+
+def refuse_idle(config: SceneConfig) -> None:
+    """Nothing, when everything that was asked for of the scene changes something.
+
+    Raises:
+        SceneError: the command line sets a size of another kind of part; clamps or bolts asked for on one's own part; a height
+            and a clearance that both say how high the part lies.
+    """
+    reads, given = READS[config.workpiece], config.given
+    for key, source in given.items():
+        table = key.partition(".")[0]
+        if source.kind == "command line" and table in SHAPES and table not in reads:
+            raise SceneError(
+                f'scene.{key} changes nothing here: workpiece = "{config.workpiece}" reads {", ".join(reads)}', key=key
+            )
+    if config.workpiece == "mesh" and config.fixture.clamps and "fixture.clamps" in given:
+        raise SceneError("fixture.clamps: one's own part has none; leave it out, or give 0", key="fixture.clamps")
+    if config.pose.z is not None and {"pose.z", "pose.clearance"} <= set(given):
+        raise SceneError("pose.z and pose.clearance both say how high the part lies; give one", key="pose.clearance")
 
 
 def make_workpiece(config: SceneConfig) -> Workpiece:

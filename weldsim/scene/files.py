@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from weldsim.errors import SceneError
+from weldsim.settings import nearest
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -38,8 +39,11 @@ def scene_path(name: str | Path) -> Path:
         raise SceneError(f"scene {str(name)!r}: no such file", scene=str(name), allowed=scene_names())
     if str(name) in scene_names():
         return scenes_folder() / f"{name}.toml"
+    beside = path.with_name(f"{path.name}.toml")
+    meant = str(beside) if beside.is_file() else nearest(str(name), scene_names())
     raise SceneError(
-        f"scene {str(name)!r} is unknown; known are {', '.join(scene_names())}, or give a path ending in .toml",
+        f"scene {str(name)!r} is unknown{f'; did you mean {meant}?' if meant else ''}; known are {', '.join(scene_names())},"
+        " or give a path ending in .toml",
         scene=str(name),
         allowed=scene_names(),
     )

@@ -1,12 +1,14 @@
 """The simulated cameras by name: which class, which settings, where they stand. Imports no heavy library until one is made."""
 
-from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, get_args, runtime_checkable
 
+from weldsim.errors import InputError
 from weldsim.frames import Transform
 from weldsim.mounts import KINECT_V2, X_WC_KINECT
 from weldsim.records import CameraIntrinsics
 from weldsim.sensor.base import DepthSensor
 from weldsim.sensor.d415 import D435_848X480, D415Config, D435Config, unit_intrinsics
+from weldsim.sensor.names import SensorName
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
     from weldsim.sensor.exact import TwinScene
     from weldsim.sensor.kinect import KinectConfig
 
-SensorName = Literal["d415", "d435", "d415-stereo", "kinect", "exact"]
+__all__ = ["EXACT_STEP", "SensorName", "SensorTables", "depth_step", "make_sensor", "posture", "stations"]
+
 EXACT_STEP = 1e-4  # [m] of depth that has no step of its own, in a PNG
 
 
@@ -44,8 +47,10 @@ def make_sensor(
         intrinsics: nominal ones of the wrist camera; a D435 in its place and the Kinect have their own.
         tables: settings of all of them.  seed: of the unit and its noise.
     Raises:
-        SensorError: nothing draws here.
+        SensorError: nothing draws here.  InputError: a name that no camera has.
     """
+    if name not in get_args(SensorName):
+        raise InputError(f"sensor {name!r} is not one of {', '.join(get_args(SensorName))}", sensor=name)
     if name == "d415-stereo":
         from weldsim.sensor.active_stereo import D415Stereo
 

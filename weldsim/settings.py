@@ -1,0 +1,135 @@
+"""Settings as people give them: TOML tables and `key=value` overrides, with where each value came from.
+
+Imports nothing heavy: commands that only look at a file's title read it here.
+"""
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from weldsim.errors import ConfigError
+
+ALIKE = 0.75  # from which likeness on a word counts as a misspelt other one
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a value comes from. Attributes: kind; name, of the file, scene or option."""
+
+    kind: Literal["default", "scene", "file", "command line"]
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.name}".rstrip()
+
+
+DEFAULT, COMMAND_LINE = Source("default"), Source("command line")
+Given = Mapping[str, Source]
+"""Dotted key of every value that was given, and where."""
+
+
+def load_toml(path: str | Path) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises:
+        ConfigError: the file is missing, unreadable, not UTF-8 or not TOML (with the line).
+    """
+    try:
+        return tomllib.loads(Path(path).read_bytes().decode())
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file", path=str(path)) from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})", path=str(path)) from None
+    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
+        raise ConfigError(f"{path}: no TOML: {reason}", path=str(path)) from None
+
+
+def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """A copy of `data` with every `dotted.key=value` set; the value is TOML if it reads as such, else plain text.
+
+    Raises:
+        ConfigError: no `=`, an empty key, or a key that leads through a value.
+    """
+    return with_sources(data, DEFAULT, overrides)[0]
+
+
+def with_sources(data: Mapping[str, Any], source: Source, overrides: Iterable[str]) -> tuple[dict[str, Any], dict[str, Source]]:
+    """`apply_overrides`, and where each value that is now in the tables came from: `source`, or the command line."""
+    result: dict[str, Any] = deepcopy(dict(data))
+    given = dict.fromkeys(leaves(result), source)
+    for text in overrides:
+        parts, value = _split(text)
+        table = result
+        for depth, part in enumerate(parts[:-1]):
+            table = table.setdefault(part, {})
+            if not isinstance(table, dict):
+                raise ConfigError(f"override {text!r}: {'.'.join(parts[: depth + 1])} is a value, not a table", value=text)
+        table[parts[-1]] = value
+        key = ".".join(parts)
+        given = {known: where for known, where in given.items() if not (known == key or known.startswith(f"{key}."))}
+        given |= dict.fromkeys(leaves(value, key), COMMAND_LINE)
+    return result, given
+
+
+def key_of(override: str) -> str:
+    """The dotted key that `key=value` sets. Raises ConfigError."""
+    return ".".join(_split(override)[0])
+
+
+def leaves(value: Any, key: str = "") -> Iterator[str]:
+    """Dotted keys of all values in nested tables; an array counts as one value."""
+    if not isinstance(value, Mapping):
+        yield key
+        return
+    for name, inner in value.items():
+        yield from leaves(inner, f"{key}.{name}".lstrip("."))
+
+
+def value_at(tables: Mapping[str, Any], key: str) -> Any:
+    """What stands at a dotted key, views[0].tilt say; None where nothing does."""
+    value: Any = tables
+    for part in key.replace("[", ".").replace("]", "").split("."):
+        if isinstance(value, Mapping):
+            value = value.get(part)
+        elif isinstance(value, list | tuple) and part.isdecimal() and int(part) < len(value):
+            value = value[int(part)]
+        else:
+            return None
+    return value
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The one of `known` that `word` is a misspelling of, or ""."""
+    return next(iter(difflib.get_close_matches(word, list(known), n=1, cutoff=ALIKE)), "")
+
+
+def meant_keys(key: str, known: Iterable[str]) -> list[str]:
+    """The dotted keys that may be meant where `key` is none: its tables left out or others before it, or misspelt."""
+    known, parts = list(known), key.split(".")
+    for start in range(len(parts)):
+        end = ".".join(parts[start:])
+        if found := [one for one in known if one == end or one.endswith(f".{end}")]:
+            return found
+    return list(filter(None, [nearest(key, known)]))
+
+
+def _split(text: str) -> tuple[list[str], Any]:
+    """Parts of the key, and the value."""
+    key, equals, value = text.partition("=")
+    parts = [part.strip() for part in key.split(".")]
+    if not equals or not all(parts):
+        raise ConfigError(f"override {text!r}: write dotted.key=value, seam.method=thesis say", value=text)
+    return parts, _toml_value(value.strip())
+
+
+def _toml_value(text: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return parsed["value"] if list(parsed) == ["value"] else text
