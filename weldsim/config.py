@@ -7,7 +7,7 @@ imports neither mujoco nor open3d, for every command reads this page).
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -104,29 +104,36 @@ def for_scene(config: CellConfig, scene: "SceneConfig | None") -> CellConfig:
     """The config with the scene's own `limits` in it, wherever nothing that goes before them was given.
 
     What the command line gives goes before what a file gives, that before what the scene has, that before the default; a value
-    set in Python counts as given where it is another than the default, or where `given` names it.
+    set in Python counts as given where it is another than the default, or where `given` names it. Where the report has a limit
+    that motion planning has too and nothing gives it, the two are the same.
     """
-    if scene is None:
-        return config
-    tables = {"report": config.report, "motion": config.motion}
-    given = dict(config.given)
-    for limit in fields(scene.limits):
-        value = getattr(scene.limits, limit.name)
-        table = "report" if hasattr(config.report, limit.name) else "motion"
-        if value is None or not _goes_first(config, table, limit.name, scene.given.get(f"limits.{limit.name}")):
-            continue
-        tables[table] = replace(tables[table], **{limit.name: value})
-        given[f"{table}.{limit.name}"] = scene.given.get(f"limits.{limit.name}", Source("scene", scene.name))
+    tables, given = {"report": config.report, "motion": config.motion}, dict(config.given)
+    limits = {} if scene is None else {name: value for name, value in vars(scene.limits).items() if value is not None}
+    for table in tables:
+        for name in limits:
+            source = None if scene is None else scene.given.get(f"limits.{name}", Source("scene", scene.name))
+            if hasattr(tables[table], name) and source is not None and _goes_first(config, table, name, source):
+                tables[table] = replace(tables[table], **{name: limits[name]})
+                given[f"{table}.{name}"] = source
+    for name in vars(tables["report"]):
+        if hasattr(tables["motion"], name) and not _is_given(config, "report", name):
+            tables["report"] = replace(tables["report"], **{name: getattr(tables["motion"], name)})
+            given |= {f"report.{name}": given[key] for key in [f"motion.{name}"] if key in given}
     return replace(config, **tables, given=given)
 
 
-def _goes_first(config: CellConfig, table: str, name: str, scene: Source | None) -> bool:
-    """Whether a scene's limit, which came from `scene`, goes before the config's own value."""
-    cell = config.given.get(f"{table}.{name}")
-    if cell is None:
-        own = getattr(config, table)
-        return getattr(own, name) == getattr(type(own)(), name)
-    return cell.kind == "scene" or (scene is not None and scene.kind == "command line" and cell.kind != "command line")
+def _is_given(config: CellConfig, table: str, name: str) -> bool:
+    """Whether a file, the command line or Python gave that value; what an earlier scene put there does not count."""
+    own = getattr(config, table)
+    source = config.given.get(f"{table}.{name}")
+    return source.kind != "scene" if source is not None else getattr(own, name) != getattr(type(own)(), name)
+
+
+def _goes_first(config: CellConfig, table: str, name: str, source: Source) -> bool:
+    """Whether a scene's limit, which came from `source`, goes before the config's own value."""
+    return not _is_given(config, table, name) or (
+        source.kind == "command line" and config.source(f"{table}.{name}").kind != "command line"
+    )
 
 
 def limits_for(config: CellConfig, scene: "SceneConfig | None") -> ReportConfig:
@@ -156,10 +163,16 @@ def load_scene(name: str | Path, overrides: Iterable[str] = ()) -> "SceneConfig"
     return scene
 
 
-def load_config(path: str | Path | None = None, overrides: Iterable[str] = ()) -> CellConfig:
-    """The cell's config from a TOML file (or the defaults) with `key=value` overrides. Raises ConfigError."""
-    tables, given = with_sources({} if path is None else load_toml(path), Source("file", str(path)), overrides)
-    return replace(_structured(tables, CellConfig, "config" if path is None else str(path), given), given=given)
+def load_config(path: str | Path | Mapping[str, Any] | None = None, overrides: Iterable[str] = ()) -> CellConfig:
+    """The cell's config from a TOML file, or tables as one has them, or the defaults, with `key=value` overrides.
+
+    Raises:
+        ConfigError: the file or a setting is wrong.
+    """
+    where = str(path) if isinstance(path, str | Path) else "config"
+    data = path if isinstance(path, Mapping) else {} if path is None else load_toml(path)
+    tables, given = with_sources(data, Source("file", "" if isinstance(path, Mapping) else where), overrides)
+    return replace(_structured(tables, CellConfig, where, given), given=given)
 
 
 def _structured(tables: Mapping[str, Any], cls: type[Config], where: str, given: Given) -> Config:

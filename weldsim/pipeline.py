@@ -11,17 +11,20 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from weldsim.clock import Clock, Tell
 from weldsim.cloud.deproject import deproject
 from weldsim.cloud.files import check_plannable
 from weldsim.cloud.filters import prepare
 from weldsim.cloud.views import merge_views
 from weldsim.config import CellConfig, digest, limits_for
-from weldsim.errors import ExecutionError
+from weldsim.errors import ExecutionError, InputError, WeldsimError
+from weldsim.inputs import CloudLike, ConfigLike, SceneLike, cloud_from, config_from, findings_from, scene_from
 from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, Weld, pick, seams_to_weld, unplanned
 from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.plan import plan_paths
-from weldsim.records import ExecutionLog, PointCloud, TorchPath, WeldReport
+from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import REGION
 from weldsim.report.progress import weld_progress
 from weldsim.report.weld import joined, weld_report
@@ -35,7 +38,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from weldsim.scan.tour import Tour
-    from weldsim.scene.config import SceneConfig
     from weldsim.scene.workpieces.base import Workpiece
     from weldsim.scene.world import World
 
@@ -59,8 +61,8 @@ __all__ = [
 
 
 def run(
-    scene: "SceneConfig",
-    config: CellConfig | None = None,
+    scene: SceneLike,
+    config: ConfigLike | None = None,
     *,
     seed: int = 0,
     sensor: SensorName = "d415",
@@ -75,7 +77,7 @@ def run(
     A weld that is stopped is a result too: its report says so, and how far it came.
 
     Args:
-        scene: what stands on the table.  config: everything else.
+        scene: what stands on the table: its name, a TOML file, or a `SceneConfig`.  config: everything else.
         seed: of the camera's noise.  sensor: which camera looks.
         number, near: which seam to weld; see `pick`; "all" welds every one that has a path, one after the other.
         video: where to write a film of the weld.  black_boxes: folder for what the safety gate leaves behind at a stop.
@@ -83,35 +85,39 @@ def run(
     Raises:
         WeldsimError: see the stages; finding no seam is a result, not an error.
     """
-    config, clock = config or CellConfig(), Clock(tell or (lambda stage, done: None))
-    seen = look(scene, config, seed=seed, sensor=sensor, move=config.scan.move, clock=clock)
+    config, clock = config_from(config), Clock(tell or (lambda stage, done: None))
+    seen = look(scene, config, seed=seed, sensor=sensor, clock=clock)
     result = plan(seen.cloud, config, clock=clock)
     return finish(seen, result, config, number=number, near=near, video=video, black_boxes=black_boxes, stops=True, clock=clock)
 
 
 def look(
-    scene: "SceneConfig",
-    config: CellConfig | None = None,
+    scene: SceneLike,
+    config: ConfigLike | None = None,
     *,
     seed: int = 0,
     sensor: SensorName = "d415",
     world: "World | None" = None,
-    move: bool = False,
+    move: bool | None = None,
     clock: Clock | None = None,
 ) -> Sighting:
     """The scene built and scanned from all its views, which are lined up and merged into one cloud in the robot base.
 
     Args:
-        scene: what stands on the table.  config: everything else.
-        seed: of the camera's noise.  sensor: which camera looks.
-        move: whether the arm is driven from view to view and starts the weld from there (never for the Kinect), or put there.
+        scene: what stands on the table: its name, a TOML file, or a `SceneConfig`.  config: everything else.
+        seed: of the camera's noise, 0 or more.  sensor: which camera looks.
+        move: whether the arm is driven from view to view and starts the weld from there (never for the Kinect), or put there; by
+            default what `config.scan.move` says.
         world: `scene` already built, by whoever looks at it several times.  clock: takes the times.
     Raises:
         SceneError, ViewError, SensorError, CloudError: see the stages.
     """
     from weldsim.scene.world import build_world
 
-    config, clock = config or CellConfig(), clock or Clock()
+    config, clock, scene = config_from(config), clock or Clock(), scene_from(scene)
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed {seed!r}: a whole number, 0 or more, is needed", seed=seed)
+    move = config.scan.move if move is None else move
     with clock.stage("scene"):
         world = build_world(scene, twin=config.twin) if world is None else world
     if config.scan.views == "auto" and sensor != "kinect":
@@ -137,25 +143,27 @@ def look(
 
 
 def plan(
-    cloud: PointCloud, config: CellConfig | None = None, *, find: Finder | None = None, clock: Clock | None = None
+    cloud: CloudLike, config: ConfigLike | None = None, *, find: Finder | None = None, clock: Clock | None = None
 ) -> PlanResult:
     """Seams of a cloud in the robot base, best first, and a torch path along each; none of either where there is no seam.
 
     A seam along which no path can be laid is named in `refused` and does not keep the others from being planned.
 
     Args:
-        cloud: in B.  config: every stage's settings.
-        find: a seam finder of the caller's own, in place of the one that `config.seam` names.
+        cloud: in B: a `PointCloud`, an (n, 3) array [m], a `DepthFrame`, or a file.  config: every stage's settings.
+        find: a seam finder of the caller's own, in place of the one that `config.seam` names: it is handed the cloud and returns
+            `SeamFindings`, a `Seam`, several, an (n, 3) polyline [m], or None.
         clock: takes the times.
     Raises:
-        CloudError: a cloud that cannot show a seam.  PathError: the path asked for fits none of the seams.
+        InputError: no cloud at all, or a finder that fails.  CloudError: a cloud that cannot show a seam.
+        PathError: the path asked for fits none of the seams.
     """
-    config, clock = config or CellConfig(), clock or Clock()
+    config, clock = config_from(config), clock or Clock()
     with clock.stage("cloud"):
-        cloud = prepare(cloud, config.cloud)
+        cloud = prepare(cloud_from(cloud), config.cloud)
         check_plannable(cloud)
     with clock.stage("seam"):
-        cloud, findings, notes = search(cloud, partial(find_seams, config=config.seam) if find is None else find)
+        cloud, findings, notes = search(cloud, partial(find_seams, config=config.seam) if find is None else partial(_found, find))
     with clock.stage("path"):
         paths, refused = plan_paths(findings.seams, config.path)
     return PlanResult(
@@ -172,7 +180,7 @@ def plan(
 def finish(
     seen: Sighting,
     result: PlanResult,
-    config: CellConfig,
+    config: ConfigLike | None = None,
     *,
     number: int | Literal["all"] | None = None,
     near: Sequence[float] | None = None,
@@ -194,7 +202,7 @@ def finish(
         MotionError, ExecutionError: the arm cannot.  InputError: a seam number that there is not.
         PathError: the seam that is meant has no path.
     """
-    clock, world = clock or Clock(), seen.world
+    config, clock, world = config_from(config), clock or Clock(), seen.world
     meant = seams_to_weld(result, number, near)
     welds = _weld(seen, meant, config, clock, video, black_boxes) if execute and meant else ()
     if welds and welds[-1].error is not None and not stops:
@@ -254,6 +262,18 @@ def _unjudged(part: "Workpiece") -> tuple[tuple[str, str], ...]:
         why = "not judged: no seam is known ([mesh] names no seam file)"
         return tuple((figure, why) for figure in ("distance from the known seam", "phantom seams", REGION))
     return () if part.region_is_known else ((REGION, "not judged: the seam file has no width"),)
+
+
+def _found(find: Finder, cloud: PointCloud) -> SeamFindings:
+    """What the caller's own finder finds. Raises InputError where it fails."""
+    name = getattr(find, "__name__", type(find).__name__)
+    try:
+        answer = find(cloud)
+    except (WeldsimError, KeyboardInterrupt, MemoryError):
+        raise
+    except Exception as error:
+        raise InputError(f"finder {name}: raised {type(error).__name__}: {error}", finder=name) from error
+    return findings_from(answer, cloud, name)
 
 
 def _weld(

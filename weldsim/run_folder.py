@@ -15,7 +15,7 @@ import numpy as np
 from weldsim.cloud.depth_output import write_depth_frame
 from weldsim.cloud.files import write_cloud
 from weldsim.cloud.register import Registration
-from weldsim.config import CellConfig, limits_for, to_json
+from weldsim.config import CellConfig, for_scene, limits_for, to_json
 from weldsim.errors import OutputError
 from weldsim.output import write_whole
 from weldsim.path.files import path_document, write_path_csv, write_path_json
@@ -95,7 +95,7 @@ def folder_in_place(folder: Path, fill: Callable[[Path], None], *, keep_earlier:
 
 def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: SensorName) -> None:
     plan, report = result.plan, result.report
-    resolved = {"cell": to_json(config), "scene": to_json(scene), "seed": seed, "sensor": sensor}
+    resolved = {"cell": to_json(for_scene(config, scene)), "scene": to_json(scene), "seed": seed, "sensor": sensor}
     write_json(folder / "config.json", resolved)
     source = {"scene": scene.name, "seed": seed, "sensor": sensor, "points": len(plan.cloud), "method": plan.findings.method}
     reasons = {index: str(error) for index, error in plan.refused.items()}

@@ -10,7 +10,7 @@ import tyro
 from weldsim import units
 from weldsim.cli.dry_run import failures
 from weldsim.cli.options import ConfigOptions
-from weldsim.cli.outputs import check_folder, nearest_folder
+from weldsim.cli.outputs import check_folder, nearest_folder, refuse_file
 from weldsim.cli.quantities import SHARE, quantity
 from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
 from weldsim.cli.signals import INTERRUPTED, interrupted_once
@@ -134,6 +134,7 @@ class Execute(ConfigOptions):
 
         if folder.name in ("", ".", ".."):
             raise InputError(f"--out {folder}: give the run directory a name of its own", path=str(folder))
+        refuse_file(folder, "--out", f"a run directory is written, with path.json, report.html and more in it; {folder.stem} say")
         check_folder(nearest_folder(folder), folder)
         check_run_folder(folder)
 

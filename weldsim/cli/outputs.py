@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from weldsim.errors import InputError, OutputError
@@ -43,7 +43,18 @@ def nearest_folder(path: Path) -> Path:
     return next(folder for folder in path.resolve().parents if folder.exists())
 
 
-def check_suffix(path: Path | None, allowed: tuple[str, ...], what: str) -> None:
-    """Raises OutputError when `path` does not end as `what` does."""
+def check_suffix(path: Path | None, allowed: tuple[str, ...], what: str, *, others: Mapping[str, str] | None = None) -> None:
+    """Raises OutputError when `path` does not end as `what` does; `others` are options that write what it ends as."""
     if path is not None and path.suffix.lower() not in allowed:
-        raise OutputError(f"{path}: {what} ends in {' or '.join(allowed)}", path=str(path), allowed=list(allowed))
+        option = (others or {}).get(path.suffix.lower())
+        hint = f"; did you mean {option} {path}?" if option is not None else ""
+        raise OutputError(f"{path}: {what} ends in {' or '.join(allowed)}{hint}", path=str(path), allowed=list(allowed))
+
+
+FILES = (".json", ".csv", ".html", ".htm", ".pdf", ".png", ".jpg", ".svg", ".mp4", ".toml", ".ply", ".npz", ".txt", ".md", ".xml")
+
+
+def refuse_file(folder: Path, option: str, why: str) -> None:
+    """Raises OutputError where the name of a folder to be made is that of a file."""
+    if folder.suffix.lower() in FILES and not folder.is_dir():
+        raise OutputError(f"{option} {folder}: {why}", path=str(folder))

@@ -8,7 +8,7 @@ import tyro
 
 from weldsim import units
 from weldsim.cli.options import ConfigOptions, Method, refuse_together
-from weldsim.cli.outputs import check_folder, check_outputs, nearest_folder
+from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
 from weldsim.cli.quantities import COUNT, POINT, quantities, quantity
 from weldsim.cli.show import Tell, progress, table, times
 from weldsim.errors import CloudError, InputError, NoSeamError, PathError
@@ -66,7 +66,8 @@ class Plan(ConfigOptions):
     """Where to write the path as CSV with UR poses of the torch tip."""
 
     report: Path | None = None
-    """Where to write the report: a file ending in .html, its picture beside it, or a folder."""
+    """Where to write the report: a page ending in .html, a picture ending in .png, or a folder for both. It takes several times as
+    long as the plan, for it says too how much the line would move at other thresholds."""
 
     def __call__(self) -> int:
         """0. Raises NoSeamError, after the report where one was asked for."""
@@ -75,12 +76,13 @@ class Plan(ConfigOptions):
         config = self.cell(self.method)
         with progress() as tell:
             result, clock = self._plan(config, tell)
-            if page is not None and picture is not None:
+            if self.report is not None:
                 with clock.stage("stability"):
                     result = _with_stability(result, config)
             chosen, numbers = self._chosen(result)
-            if page is not None and picture is not None:
-                self._write_report(page, picture, chosen, clock, config)
+            if self.report is not None:
+                with clock.stage("report"):
+                    self._write_report(page, picture, chosen, clock, config)
         if not result.findings.seams:
             told = "; ".join((_reasons(result.findings), *result.notes))
             raise NoSeamError(
@@ -92,7 +94,7 @@ class Plan(ConfigOptions):
         if self.json:
             self._print_json(document, result)
         else:
-            self._print(chosen, numbers, result, clock, page)
+            self._print(chosen, numbers, result, clock, [path for path in (self.out, self.csv, page, picture) if path is not None])
         return 0
 
     def _check(self, page: Path | None, picture: Path | None) -> None:
@@ -103,12 +105,25 @@ class Plan(ConfigOptions):
         for name in ("pose", "depth_unit"):
             if getattr(self, name) is not None and self.intrinsics is None:
                 raise InputError(f"--{name.replace('_', '-')}: belongs to a depth image; give its --intrinsics too", option=name)
+        check_suffix(self.out, (".json",), "a path", others={".csv": "--csv"})
+        check_suffix(self.csv, (".csv",), "a path as CSV", others={".json": "--out"})
         if self.seam is not None and self.seam < 1:
             raise InputError(f"--seam {self.seam}: seams are counted from 1", seam=self.seam)
         if page is not None and page.parent == self.report and not page.parent.exists():
             check_folder(nearest_folder(page), page)
             page = picture = None  # in a folder still to be made
+        self._refuse_scene()
         check_outputs((self.out, self.csv, page, picture), (self.cloud, self.intrinsics, self.pose, self.config))
+
+    def _refuse_scene(self) -> None:
+        """Raises InputError where the cloud is the name of a scene."""
+        from weldsim.scene.files import scene_names
+
+        if str(self.cloud) in scene_names() and not self.cloud.exists():
+            raise InputError(
+                f"{self.cloud} is a scene, no cloud; did you mean weldsim run {self.cloud}, or first"
+                f" weldsim scan {self.cloud} --out {self.cloud}.ply?"
+            )
 
     def _hint(self, config: "CellConfig") -> str:
         """What to do where no seam was found; empty where nothing that was tried helps."""
@@ -117,11 +132,15 @@ class Plan(ConfigOptions):
         return hint(self._read(config), config, imaged=self.intrinsics is not None)
 
     def _report_files(self) -> tuple[Path | None, Path | None]:
-        """HTML and PNG."""
+        """HTML and PNG; None for what is not asked for. Raises OutputError for a name that is neither, nor a folder's."""
+        suffix = "" if self.report is None else self.report.suffix.lower()
         if self.report is None:
             return None, None
-        if self.report.suffix.lower() in (".html", ".htm"):
-            return self.report, self.report.with_suffix(".png")
+        if suffix in (".html", ".htm"):
+            return self.report, None
+        if suffix == ".png":
+            return None, self.report
+        refuse_file(self.report, "--report", "a page ends in .html, a picture in .png, a folder in neither")
         return self.report / "report.html", self.report / "report.png"
 
     def _plan(self, config: "CellConfig", tell: Tell) -> "tuple[PlanResult, Clock]":
@@ -200,7 +219,9 @@ class Plan(ConfigOptions):
         if self.csv is not None:
             write_path_csv(self.csv, document)
 
-    def _write_report(self, page: Path, picture: Path, chosen: "PlanResult", clock: "Clock", config: "CellConfig") -> None:
+    def _write_report(
+        self, page: Path | None, picture: Path | None, chosen: "PlanResult", clock: "Clock", config: "CellConfig"
+    ) -> None:
         from weldsim.pipeline import unplanned
         from weldsim.report.html import write_html
         from weldsim.report.png import write_png
@@ -215,10 +236,11 @@ class Plan(ConfigOptions):
             config_digest=chosen.config_digest,
             config=config.report,
         )
-        clock.tell("report", None)
-        page.parent.mkdir(parents=True, exist_ok=True)
-        write_html(page, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
-        write_png(picture, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+        if page is not None:
+            page.parent.mkdir(parents=True, exist_ok=True)
+            write_html(page, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+        if picture is not None:
+            write_png(picture, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
 
     def _print_json(self, document: dict[str, Any], result: "PlanResult") -> None:
         import numpy as np
@@ -233,7 +255,7 @@ class Plan(ConfigOptions):
         print(path_text({**document, **more}), end="")
 
     def _print(
-        self, chosen: "PlanResult", numbers: tuple[int, ...], result: "PlanResult", clock: "Clock", page: Path | None
+        self, chosen: "PlanResult", numbers: tuple[int, ...], result: "PlanResult", clock: "Clock", written: list[Path]
     ) -> None:
         import numpy as np
 
@@ -265,9 +287,8 @@ class Plan(ConfigOptions):
         for clause in (*unplanned(chosen), *result.notes):
             print(f"  {clause}")
         print(times(clock.seconds))
-        for path in (self.out, self.csv, page):
-            if path is not None:
-                print(f"  wrote {path}")
+        for path in written:
+            print(f"  wrote {path}")
 
 
 def _with_stability(result: "PlanResult", config: "CellConfig") -> "PlanResult":

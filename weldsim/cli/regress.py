@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, Method, choose_platform
+from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, choose_platform
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
@@ -34,8 +34,8 @@ class Regress(ConfigOptions):
     scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SCENE ...")] = ()
     """Names or TOML files; all that come with weldsim by default."""
 
-    methods: Annotated[tuple[Method, ...], tyro.conf.arg(metavar="METHOD ...")] = ("profile", "thesis")
-    """Seam finders."""
+    methods: Annotated[tuple[str, ...], tyro.conf.arg(metavar="METHOD ...")] = ("profile", "thesis")
+    """Seam finders: profile, thesis, or your own as package.module:function or file.py:function, which is handed the cloud."""
 
     seeds: int = 3
     """How many seeds of the camera's noise: 0 to SEEDS - 1."""
@@ -107,8 +107,10 @@ class Regress(ConfigOptions):
 
     def _check(self, path: Path) -> None:
         """Raises InputError for options that do not go together, OutputError for places that cannot be written."""
+        from weldsim.regression.finders import told_apart
         from weldsim.regression.golden import is_packed
 
+        told_apart(self.methods, None)
         if self.update and not (self.reason or "").strip():
             raise InputError("--update: needs --reason, which is kept beside every figure that changes")
         if self.reason is not None and not self.update:

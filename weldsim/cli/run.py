@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
-from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
+from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
 from weldsim.cli.quantities import POINT, quantities
 from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
 from weldsim.errors import InputError, SensorError
@@ -119,6 +119,7 @@ class Run(ConfigOptions):
         check_outputs((self.video,), (self.config,))
         if folder.name in ("", ".", ".."):
             raise InputError(f"--out {folder}: give the run directory a name of its own", path=str(folder))
+        refuse_file(folder, "--out", f"a run directory is written, with path.json, report.html and more in it; {folder.stem} say")
         check_folder(nearest_folder(folder), folder)
 
     def _print_json(self, report: "WeldReport", limits: "ReportConfig", written: list[Path], kept: Path | None) -> None:

@@ -1,15 +1,18 @@
 """Seams: found ones with what the finder has to say about them, and the known one of a workpiece."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from weldsim.errors import RecordError
 from weldsim.records.checks import check_increasing, check_metres, check_unit, require, store
 
 JOINED = 1e-6  # [m] between the ends of a ring
+SAME_PLACE = 1e-9  # [m] between points that are one
+LEAST_ACROSS = 0.05  # share of a normal that must stand across travel
 
 Reference = Literal["opening", "root", "gap_mid"]
 Joint = Literal["groove", "butt", "lap", "fillet", "saddle"]
@@ -79,6 +82,63 @@ class Seam:
             self,
             "gaps",
             f"{self.gaps} are not ordered stretches within 0 to {float(self.s[-1]):g} m",
+        )
+
+    @classmethod
+    def along(
+        cls,
+        points: Any,
+        normals: Any = (0.0, 0.0, 1.0),
+        *,
+        width: float = 0.0,
+        confidence: float = 1.0,
+        reference: Reference = "opening",
+        joint: Joint = "groove",
+    ) -> "Seam":
+        """The seam along a polyline, closed where it ends within 1 um of its start; points that repeat are left out.
+
+        Args:
+            points: (n, 3) in B, ordered along travel [m].
+            normals: (n, 3), or (3,) for all: out of the surface; what of them lies along travel is taken off.
+            width: between the lips [m].  confidence: 0 to 1.  reference, joint: which line of which joint the points are.
+        Raises:
+            RecordError: fewer than two places, numbers that are not finite, normals along travel.
+        """
+        try:
+            line, up = np.asarray(points, float), np.asarray(normals, float)
+        except (TypeError, ValueError):
+            raise RecordError("Seam.points_B: no array of numbers; (n, 3) points in metres are wanted", field="points_B") from None
+        if line.ndim != 2 or line.shape[1] != 3 or not np.isfinite(line).all():
+            raise RecordError(f"Seam.points_B: shape {line.shape}, (n, 3) finite numbers are wanted", field="points_B")
+        if up.shape not in ((3,), line.shape):
+            raise RecordError(f"Seam.normals_B: shape {up.shape}, (3,) or {line.shape} is wanted", field="normals_B")
+        keep = np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > SAME_PLACE])
+        line, up = line[keep], np.broadcast_to(up, line.shape)[keep]
+        if len(line) < 2:
+            raise RecordError(f"Seam.points_B: {len(line)} places; a seam needs two", field="points_B")
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        closed = len(line) > 3 and bool(np.linalg.norm(line[-1] - line[0]) <= JOINED)
+        tangents = np.gradient(line, s, axis=0)
+        if closed:
+            tangents[0] = tangents[-1] = line[1] - line[-2]
+        lengths = np.linalg.norm(tangents, axis=1, keepdims=True)
+        if not (lengths > 0).all():
+            raise RecordError("Seam.tangents_B: the line turns back on itself", field="tangents_B")
+        tangents = tangents / lengths
+        across = up - np.einsum("ij,ij->i", up, tangents)[:, None] * tangents
+        size = np.linalg.norm(across, axis=1, keepdims=True)
+        if not (size > LEAST_ACROSS * np.linalg.norm(up, axis=1, keepdims=True)).all():
+            raise RecordError("Seam.normals_B: along travel in places; give the surface's own normals", field="normals_B")
+        return cls(
+            points_B=line,
+            s=s,
+            tangents_B=tangents,
+            normals_B=across / size,
+            width=width,
+            confidence=confidence,
+            reference=reference,
+            joint=joint,
+            closed=closed,
         )
 
     @property

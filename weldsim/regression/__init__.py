@@ -13,6 +13,7 @@ A recorded cloud with a line that is known to be its seam is judged by the same 
 from weldsim.regression.distribution import Judgement, Shift, judge
 from weldsim.regression.figures import FIGURES, Figure, Figures, figures_of
 from weldsim.regression.golden import Deviation, Golden, compare, default_golden, read_golden, updated, write_golden
+from weldsim.regression.junit import write_junit
 from weldsim.regression.suite import Regression, Row, regress
 
 __all__ = [
@@ -33,4 +34,5 @@ __all__ = [
     "regress",
     "updated",
     "write_golden",
+    "write_junit",
 ]

@@ -9,12 +9,14 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from weldsim.config import CellConfig, load_scene
+from weldsim.config import CellConfig
 from weldsim.errors import ExecutionError, InputError
+from weldsim.inputs import ConfigLike, SceneLike, config_from, scene_from
 from weldsim.pipeline import Finder, SensorName
 from weldsim.regression.distribution import Judgement, Shift, judge
+from weldsim.regression.finders import METHODS, Method, told_apart
 from weldsim.regression.golden import Deviation, Golden
 from weldsim.regression.job import Row, Task, carry_out
 from weldsim.scene.files import scene_names
@@ -22,8 +24,6 @@ from weldsim.scene.files import scene_names
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
 
-Method = Literal["profile", "thesis"]
-METHODS: tuple[Method, ...] = ("profile", "thesis")
 Tell = Callable[[str, float | None], None]
 """Told what was finished and the fraction of all tasks done, 0 to 1."""
 
@@ -70,14 +70,14 @@ class Regression:
 
 
 def regress(
-    scenes: "Sequence[str | Path | SceneConfig] | None" = None,
+    scenes: Sequence[SceneLike] | str | Path | None = None,
     *,
-    methods: Sequence[Method] = METHODS,
+    methods: Sequence[str] = METHODS,
     finders: Mapping[str, Finder] | None = None,
     seeds: int = 3,
     seeds_of: Mapping[str, int] | None = None,
     jobs: int = 1,
-    config: CellConfig | None = None,
+    config: ConfigLike | None = None,
     sensor: SensorName = "d415",
     execute: bool = False,
     golden: Golden | None = None,
@@ -89,7 +89,8 @@ def regress(
 
     Args:
         scenes: names, TOML files or configs; None = all that come with weldsim.
-        methods: seam finders of weldsim's.  finders: {name: the caller's own}, judged besides.
+        methods: seam finders of weldsim's, or the user's as "package.module:function".
+        finders: {name: the caller's own}, judged besides.
         seeds: of the camera's noise, 0 to seeds - 1; each scene and seed is scanned once for all methods.
         seeds_of: {method: its own number of seeds}.
         jobs: processes, each with one core (threads of native libraries are held to one); 1 = this process.
@@ -104,8 +105,9 @@ def regress(
         ExecutionError: a worker process died.
     """
     started, tell = time.perf_counter(), tell or (lambda what, done: None)
-    chosen = _scenes(scenes)
-    settings = _settings(config or CellConfig(), methods, finders or {})
+    chosen = _scenes([scenes] if isinstance(scenes, str | Path) else scenes)
+    own, finders = told_apart(methods, finders)
+    settings = _settings(config_from(config), own, finders)
     count_of = {method: (seeds_of or {}).get(method, seeds) for method in settings}
     for name, value in (("seeds", seeds), ("jobs", jobs), *count_of.items()):
         if value < 1:
@@ -115,7 +117,7 @@ def regress(
             scene=scene,
             seed=seed,
             methods={method: each for method, each in settings.items() if seed < count_of[method]},
-            finders=dict(finders or {}),
+            finders=finders,
             execute=execute,
             golden={} if golden is None else {method: golden.entries(scene.name, method) for method in settings},
             keep=keep,
@@ -143,13 +145,10 @@ def regress(
     )
 
 
-def _scenes(scenes: "Sequence[str | Path | SceneConfig] | None") -> "list[SceneConfig]":
-    from weldsim.scene.config import SceneConfig
-
+def _scenes(scenes: Sequence[SceneLike] | None) -> "list[SceneConfig]":
     chosen = []
     for scene in scene_names() if scenes is None else scenes:
-        if not isinstance(scene, SceneConfig):
-            scene = load_scene(scene)
+        scene = scene_from(scene)
         if scene.name in [other.name for other in chosen]:
             raise InputError(f"scene {scene.name!r} is given twice", scene=scene.name)
         if not scene.name or any(mark in scene.name for mark in ("/", "\\", "\0")) or scene.name.startswith("."):
