@@ -8,12 +8,14 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any, Literal
 
 from weldsim.errors import ConfigError
 
 ALIKE = 0.75  # from which likeness on a word counts as a misspelt other one
+ALIKE_PART = 0.6  # the same for the table and the name of a dotted key, each
 
 
 @dataclass(frozen=True)
@@ -114,8 +116,20 @@ def meant_keys(key: str, known: Iterable[str]) -> list[str]:
     for start in range(len(parts)):
         end = ".".join(parts[start:])
         if found := [one for one in known if one == end or one.endswith(f".{end}")]:
-            return found
-    return list(filter(None, [nearest(key, known)]))
+            return (_alike(key, found) if start and len(found) > 1 else []) or found
+    return _alike(key, known)
+
+
+def _alike(key: str, known: Iterable[str]) -> list[str]:
+    """The dotted key of which both tables and name are a misspelling, if any."""
+    table, _, name = key.rpartition(".")
+    scored = []
+    for one in known:
+        its_table, _, its_name = one.rpartition(".")
+        likeness = [SequenceMatcher(None, *pair).ratio() for pair in ((name, its_name), (table, its_table)) if any(pair)]
+        if min(likeness) >= ALIKE_PART:
+            scored.append((sum(likeness), one))
+    return [max(scored)[1]] if scored else []
 
 
 def _split(text: str) -> tuple[list[str], Any]:

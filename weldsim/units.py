@@ -68,13 +68,11 @@ def meant(value: object, dimension: str, low: float, high: float) -> str:
 
 
 def written(value: float, dimension: str) -> tuple[str, str]:
-    """The number and the unit with which welders write an SI value; `parse` reads the two together as the same value."""
-    for unit in (*COMMON.get(dimension, ())[:1], dimension):
-        for digits in (12, 17):
-            number = f"{value / _SCALES[dimension][unit]:.{digits}g}"
-            if float(number) * _SCALES[dimension][unit] == value:
-                return number, unit
-    return repr(value), dimension
+    """The number and the unit with which welders write an SI value, to six digits; `parse` reads the two together."""
+    unit = COMMON.get(dimension, (dimension,))[0]
+    if dimension == "s" and abs(value) >= 1.0:
+        unit = "s"
+    return f"{value / _SCALES[dimension][unit]:.6g}", unit
 
 
 def length_scale(unit: str) -> float:

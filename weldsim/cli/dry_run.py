@@ -99,9 +99,11 @@ class DryRunCommand(ConfigOptions):
         check_suffix(self.export, (".script", ".urscript"), "a program")
         check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file, self.arm))
         config = self.cell()
+        self._refuse_idle_options()
         change = self._change()
 
         from weldsim.config import paced_for
+        from weldsim.dryrun.asked import at_given_speed
         from weldsim.dryrun.change import changed
         from weldsim.dryrun.read import read_program
         from weldsim.dryrun.run import dry_run
@@ -116,6 +118,7 @@ class DryRunCommand(ConfigOptions):
             roll_free=True if self.roll else None,
             q_start=cell.q_start,
         )
+        program = at_given_speed(program, config)
         if program.kind == "script" and (self.reach_map is not None or self.export is not None):
             raise InputError(f"{self.file}: --reach-map and --export are for paths; this is a robot program already")
         if program.kind == "script" and self.arm is not None:
@@ -139,6 +142,18 @@ class DryRunCommand(ConfigOptions):
         else:
             self._print(result, written, trouble)
         return 0 if result.passed else 1
+
+    def _refuse_idle_options(self) -> None:
+        """Raises InputError for an option that says what a file of this kind says itself."""
+        kind = self.file.suffix.lower()
+        if kind == ".json" and self.tool is not None:
+            raise InputError(f"--tool {self.tool}: changes nothing here: poses of a {kind} path are the wire's tip")
+        if kind not in (".csv", ".txt") and self.base != "controller":
+            raise InputError(
+                f"--base {self.base}: changes nothing here: it is for a CSV; poses of {kind or 'this'} are the controller's"
+            )
+        if kind not in (".csv", ".txt", ".json") and self.roll:
+            raise InputError("--roll: changes nothing here: it is for the poses of a CSV")
 
     def _change(self) -> "Change":
         import numpy as np

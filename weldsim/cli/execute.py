@@ -119,11 +119,12 @@ class Execute(ConfigOptions):
 
     def _program(self, config: "CellConfig") -> "Program":
         """The paths of the file. Raises InputError for anything else."""
+        from weldsim.dryrun.asked import at_given_speed
         from weldsim.dryrun.read import SCRIPTS, read_program
 
         if self.file.suffix.lower() in SCRIPTS:
             raise InputError(f"{self.file}: a robot program runs on the controller itself; execute takes paths (.json, .csv)")
-        program = read_program(self.file, speed=config.path.speed)
+        program = at_given_speed(read_program(self.file, speed=config.path.speed), config)
         if not 1 <= self.seam <= len(program.paths):
             raise InputError(f"--seam {self.seam}: {self.file} has {len(program.paths)}, counted from 1", seam=self.seam)
         return program

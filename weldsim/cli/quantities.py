@@ -39,6 +39,7 @@ TURNED = Quantity(unit="rad", low=-TURN, high=TURN, bare=0.99, example="-15 deg"
 LEANED = Quantity(unit="rad", low=-TURN / 6, high=TURN / 6, bare=0.99, example="5 deg", names=("work angle", "travel angle"))
 JOINTS = Quantity(unit="rad", low=-TURN, high=TURN, example="-90 deg", names=tuple(f"joint {k}" for k in range(1, 7)))
 MOVED = Quantity(unit="m", low=-3.0, high=3.0, bare=0.99, example="20 mm", names=("x", "y"))
+ALONG = Quantity(unit="m", low=0.0, high=10.0, bare=0.99, example="69 mm")
 WELD_SPEED = Quantity(unit="m/s", low=1e-4, high=1.0, bare=0.25, example="5 mm/s")
 COUNT = Quantity(unit="m", low=1e-6, high=0.1, bare=0.01, example="1 mm")
 SHARE = Quantity(unit="", low=1e-3, high=1.0)

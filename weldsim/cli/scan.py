@@ -54,6 +54,8 @@ class Scan(ConfigOptions):
         if self.views is not None:
             config = replace(config, scan=replace(config.scan, views=self.views))
         views = 1 if self.sensor == "kinect" else config.scan.most if config.scan.views == "auto" else len(scene.views)
+        if self.view != 1 and self.depth is None:
+            raise InputError(f"--view {self.view}: belongs to a depth image; give --depth too", view=self.view)
         if not 1 <= self.view <= max(1, views):
             raise InputError(f"--view {self.view}: scene {scene.name!r} has {views}, counted from 1", view=self.view)
         choose_platform()

@@ -84,8 +84,10 @@ def _row_of_text(row: dict[str, Any]) -> list[str]:
         text, unit = units.written(value, row["unit"])
     elif isinstance(value, str):
         text = value
+    elif row["unit"] and isinstance(value, list) and all(isinstance(one, int | float) for one in value):
+        text = json.dumps([" ".join(units.written(one, row["unit"])) for one in value])
     else:
-        text, unit = json.dumps(value, ensure_ascii=False), row["unit"]
+        text = json.dumps(value, ensure_ascii=False)
     return [
         row["key"],
         text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}...",

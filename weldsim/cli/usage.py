@@ -261,7 +261,13 @@ def _meant_options(option: str, known: Iterable[str]) -> list[str]:
 
 def _options(command: Any, *, positional: bool = False) -> set[str]:
     """Names of the options of a command, or of what it takes without a name."""
-    return {one.name.replace("_", "-") for one in fields(command) if (tyro.conf.Positional in _marks(one.type)) is positional}
+    return {_name(one) for one in fields(command) if (tyro.conf.Positional in _marks(one.type)) is positional}
+
+
+def _name(field: Any) -> str:
+    """What an option is called on the command line."""
+    own = next((mark.name for mark in _marks(field.type) if getattr(mark, "name", None)), field.name)
+    return own.replace("_", "-")
 
 
 def _short(command: Any) -> set[str]:
