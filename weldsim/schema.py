@@ -14,6 +14,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum, EnumType
+from functools import cache
 from itertools import pairwise
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -100,6 +101,7 @@ def describe(cls: type, *, prefix: str = "") -> list[FieldDoc]:
     return lines
 
 
+@cache
 def _field_docs(cls: type) -> dict[str, str]:
     """Doc of each field: the string under it, else its entry in the class docstring's Attributes."""
     names = {entry.name for entry in fields(cls)}

@@ -3,6 +3,7 @@
 import json
 import pickle
 from dataclasses import fields, replace
+from itertools import pairwise
 
 import pytest
 
@@ -137,7 +138,7 @@ def test_what_the_table_shows_can_be_set_and_is_the_same(capsys):
     starts = [head.index(name) for name in ("setting", "value", "unit", "source")]
     settings = []
     for line in lines[1:]:
-        key, value, unit = (line[a:b].strip() for a, b in zip(starts[:3], starts[1:], strict=True))
+        key, value, unit = (line[a:b].strip() for a, b in pairwise(starts))
         if value != "none" and not value.endswith("..."):
             settings.append(f'{key}="{value} {unit}"' if unit else f"{key}={value}")
     assert 'report.max="2 mm"' in settings
