@@ -3,7 +3,7 @@ is wanted."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -19,14 +19,14 @@ from weldsim.schema import structure
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
 
-CloudLike = PointCloud | DepthFrame | Float[ndarray, "n 3"] | Sequence[Sequence[float]] | str | Path
-"""A cloud in the robot base: the record, an array of points [m], a depth frame, or a file."""
-
-ConfigLike = CellConfig | Mapping[str, Any] | str | Path
-"""Settings: the record, nested tables as a TOML file has them, or such a file."""
-
-SceneLike = Union["SceneConfig", Mapping[str, Any], str, Path]
-"""A scene: the record, nested tables, the name of one that comes with weldsim, or a TOML file."""
+if TYPE_CHECKING:
+    CloudLike = PointCloud | DepthFrame | Float[ndarray, "n 3"] | Sequence[Sequence[float]] | str | Path
+    ConfigLike = CellConfig | Mapping[str, Any] | str | Path
+    SceneLike = SceneConfig | Mapping[str, Any] | str | Path
+else:  # anything may come: what is wanted is said here, and not by a checker of types
+    CloudLike = ConfigLike = SceneLike = Any
+"""A cloud in the robot base: the record, an array of points [m], a depth frame, or a file. Settings: the record, nested tables as a
+TOML file has them, or such a file. A scene: the record, nested tables, the name of one that comes with weldsim, or a TOML file."""
 
 
 def cloud_from(given: Any) -> PointCloud:

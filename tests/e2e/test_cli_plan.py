@@ -158,16 +158,28 @@ def test_seam_is_picked_by_number_or_place(weldsim, scan):
     assert "1 found" in json.loads(beyond.stdout)["error"]
 
 
-def test_report_is_a_page_and_a_picture(weldsim, scan, tmp_path):
+def test_a_report_is_a_page_a_picture_or_a_folder_of_both(weldsim, scan, tmp_path):
     done = weldsim("plan", scan / "cloud.ply", "--report", "report.html", "--set", "cloud.voxel=1.2 mm")
     assert (done.returncode, done.stderr) == (0, "")
     page = (tmp_path / "report.html").read_text()
     assert "greatest movement of the centre line" in page  # how stable the answer is about the threshold
     assert "<script src" not in page
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]  # and no file that nobody asked for
+    assert "stability" in done.stdout  # the time that the report takes is told
+    assert ", report " in done.stdout.partition("seconds:")[2]
+    done = weldsim("plan", scan / "cloud.ply", "--report", "report.png", "--set", "cloud.voxel=1.2 mm")
+    assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "report.png").read_bytes().startswith(b"\x89PNG")
     done = weldsim("plan", scan / "plain.ply", "--report", "folder/", "--set", "cloud.voxel=1.2 mm")
     assert done.returncode == 1
     assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == ["report.html", "report.png"]
+
+
+def test_a_page_is_written_where_its_picture_could_not_be(weldsim, scan, tmp_path):
+    (tmp_path / "report.png").mkdir()
+    done = weldsim("plan", scan / "cloud.ply", "--report", "report.html", "--set", "cloud.voxel=1.2 mm")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "report.html").is_file()
 
 
 def test_planning_loads_no_heavy_library(scan):

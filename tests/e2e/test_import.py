@@ -41,6 +41,15 @@ def test_commands_load_heavy_libraries_only_when_they_run(module):
     assert loaded_by(f"import {module}") & HEAVY == set()
 
 
+@pytest.mark.parametrize("words", [["--help"], ["scenes"], ["scenes", "--json"], ["plan", "--help"], ["doctor", "--help"], ["run"]])
+def test_what_computes_nothing_loads_no_library_that_computes(words):
+    """Listing the scenes took a second, most of it numpy, scipy and OpenCV."""
+    quiet = "import os; from weldsim.cli import main; kept = os.dup(1); os.dup2(os.open(os.devnull, os.O_WRONLY), 1)"
+    loaded = loaded_by(f"{quiet}; main({words!r}); sys.stdout.flush(); os.dup2(kept, 1)")
+    assert "weldsim" in loaded
+    assert loaded & (HEAVY | {"numpy", "scipy", "cv2", "jaxtyping", "cattrs"}) == set()
+
+
 def test_public_names_are_the_ones_that_load():
     assert set(weldsim.__all__) == {"__version__", *weldsim._PUBLIC}
     assert dir(weldsim) == weldsim.__all__
@@ -48,3 +57,5 @@ def test_public_names_are_the_ones_that_load():
         assert getattr(weldsim, name) is not None
     with pytest.raises(AttributeError, match="no_such_name"):
         weldsim.no_such_name  # noqa: B018 - the access is the test
+    with pytest.raises(AttributeError, match="did you mean 'load_scene'"):
+        weldsim.read_scene  # noqa: B018
