@@ -75,9 +75,10 @@ def test_addresses_that_cannot_be_had_are_refused(capsys: pytest.CaptureFixture[
     ("words", "says"),
     [
         (["fault"], "protective-stop, emergency-stop"),
-        (["fault", "protectve-stop"], "'protective-stop'"),
+        (["fault", "protectve-stop"], "did you mean protective-stop?"),
+        (["stall"], "did you mean weldsim controller fault stall?"),
         (["status", "stall"], "weldsim controller fault stall"),
-        (["fault", "none"], "invalid choice"),
+        (["fault", "none"], "'none' is not one of"),
         (["status", "--set", "path.speed=1"], "--set path.speed=1 changes nothing"),
         (["--config", "no-such.toml"], "--config no-such.toml changes nothing"),
     ],

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from itertools import groupby, pairwise
-from typing import Any
+from typing import Any, get_args
 
 import tyro
 
@@ -165,7 +165,7 @@ def _said_better(message: str, name: str, words: Sequence[str]) -> str:
     """tyro's message with what was meant, where that can be told."""
     if match := _CHOICE.match(message):
         wrong, where, choices = match[1], match[2], re.findall(r"'([^']*)'", match[3])
-        meant = _action_meant(wrong, words) if (name, where) == ("scenes", "action") else nearest(wrong, choices)
+        meant = _action_meant(name, wrong, words) if where == "action" else nearest(wrong, choices)
         return f"{where} {wrong!r} is not one of {', '.join(choices)}{f'; did you mean {meant}?' if meant else ''}"
     if match := _NUMBER.match(message):
         whole = "whole " if "int()" in message or "INT" in message else ""
@@ -180,10 +180,14 @@ def _said_better(message: str, name: str, words: Sequence[str]) -> str:
     return message
 
 
-def _action_meant(wrong: str, words: Sequence[str]) -> str:
-    """Which action of `weldsim scenes` is meant, with the scene."""
+def _action_meant(name: str, wrong: str, words: Sequence[str]) -> str:
+    """Which action of `weldsim scenes` or `controller` is meant, with what it is for."""
+    from weldsim.controller.fault_names import FaultName
     from weldsim.scene.files import scene_names
 
+    if name == "controller":
+        fault = nearest(wrong, get_args(FaultName))
+        return f"weldsim controller fault {fault}" if fault else nearest(wrong, ("serve", "fault", "status"))
     if wrong in scene_names() or wrong.endswith(".toml"):
         return f"weldsim scenes show {wrong}"
     meant = {"display": "show", "draw": "show", "view": "show", "picture": "show", "mjcf": "export", "save": "export"}
