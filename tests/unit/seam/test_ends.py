@@ -1,0 +1,56 @@
+"""Each end of a groove is where it was made, on exact clouds of grooves whose two ends differ."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from weldsim.frames import Transform, matrix_from_rotation_vector
+from weldsim.records import PointCloud
+from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.find import find_seams_profile
+
+WIDTH, DEPTH, SPACING = 0.012, 0.007, 0.0008  # [m]
+TURNS = (0.0, 2.5)  # [rad] about the vertical: the finder may walk a groove either way
+
+
+def end_errors(start: float, stop: float, low: float, high: float, turn: float) -> tuple[float, float]:
+    """How far the seam found runs on beyond either end of a groove along x [m]; less than 0 where it stops short.
+
+    Args:
+        start, stop: of the groove [m].  low, high: of the plate; a groove that reaches it runs out through its edge.
+        turn: of the plate about the vertical [rad].
+    """
+    x, y = np.meshgrid(np.arange(low + SPACING / 2, high, SPACING), np.arange(-0.06, 0.06, SPACING))
+    below = DEPTH * np.maximum(1 - np.abs(y) / (WIDTH / 2), 0.0) * ((x > start) & (x < stop))
+    X_BP = Transform("BP", matrix_from_rotation_vector(np.array([0.0, 0.0, turn])), np.array([0.1, -0.5, 0.02]))
+    points = X_BP.points(np.stack([x, y, -below], axis=-1).reshape(-1, 3))
+    cloud = PointCloud(points=points, viewpoints=X_BP.p[None] + [0.0, 0.0, 0.45])
+    (seam,) = find_seams_profile(cloud, ProfileConfig()).seams
+    found = np.sort(X_BP.inverse().points(seam.points_B[[0, -1]])[:, 0])
+    return start - found[0], found[1] - stop
+
+
+def test_a_groove_that_fades_inside_its_plate_ends_where_it_fades() -> None:
+    ends = [(-0.0603, 0.0437), (-0.0416, 0.0655)]
+    errors = np.array([end_errors(start, stop, -0.1, 0.09, turn) for (start, stop), turn in product(ends, TURNS)])
+    assert np.abs(errors).max() < 0.8e-3
+    assert np.abs(errors.mean(axis=0)).max() < 0.5e-3, "neither end is drawn out or in"
+
+
+def test_a_groove_that_leaves_its_plate_ends_at_the_plates_edge() -> None:
+    ends = [(-0.0750, 0.0601), (-0.0517, 0.0833)]
+    errors = np.array([end_errors(low, high, low, high, turn) for (low, high), turn in product(ends, TURNS)])
+    assert np.abs(errors).max() < 1.3e-3, "a cell of the parent surface is 2 mm wide"
+    assert np.abs(errors.mean(axis=0)).max() < 0.8e-3
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "low", "high", "turn"), [(-0.05, 0.0753, -0.09, 0.0753, 0.0), (-0.0817, 0.04, -0.0817, 0.09, 2.5)]
+)
+def test_a_groove_may_fade_at_one_end_and_leave_the_plate_at_the_other(
+    start: float, stop: float, low: float, high: float, turn: float
+) -> None:
+    before, after = end_errors(start, stop, low, high, turn)
+    assert abs(before) < (0.8e-3 if low < start else 1.3e-3)
+    assert abs(after) < (0.8e-3 if stop < high else 1.3e-3)
