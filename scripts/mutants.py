@@ -42,7 +42,10 @@ GROUPS: dict[str, tuple[list[str], list[str]]] = {
         ["unit/report", "property/test_metrics.py"],
     ),
     "records": (["records/*"], ["unit/test_records.py"]),
-    "frames": (["frames"], ["property/test_frames.py", "conventions/test_frames.py", "conventions/test_rotations.py"]),
+    "frames": (
+        ["frames"],
+        ["property/test_frames.py", "conventions/test_frames.py", "conventions/test_rotations.py", "unit/test_frames.py"],
+    ),
     "kinematics": (["kinematics"], ["unit/test_kinematics.py", "unit/test_arm.py"]),
     "gate": (["execution/gate"], ["unit/execution/test_gate.py"]),
     "ends": (["seam/profile/ends"], ["unit/seam/test_ends.py"]),

@@ -61,3 +61,23 @@ def test_one_pose_stays_one_and_nonsense_is_refused() -> None:
         interpolate_poses(X[0])
     with pytest.raises(InputError, match="step"):
         interpolate_poses(X, 0.0)
+
+
+def test_a_chord_shorter_than_a_step_gets_nothing_in_between() -> None:
+    X = Transform("BT", np.broadcast_to(np.eye(3), (3, 3, 3)), np.array([[0.0, 0, 0], [0.0005, 0, 0], [0.0005, 0, 0]]))
+    dense, s = interpolate_poses(X, 1e-3)
+    np.testing.assert_array_equal(dense.p, X.p)
+    np.testing.assert_allclose(s, [0.0, 0.0005, 0.0005])
+    assert len(interpolate_poses(X, 4.9e-4)[1]) == 4
+
+
+def test_what_is_refused_is_told_with_its_figure() -> None:
+    X = random_poses(0)
+    with pytest.raises(InputError, match=r"^interpolation: \(0,\) poses; a batch of at least one is needed$") as caught:
+        interpolate_poses(X[:0])
+    assert caught.value.data == {"batch": (0,)}
+    with pytest.raises(InputError, match=r"^interpolation: step -0\.5 m must be positive$") as caught:
+        interpolate_poses(X, -0.5)
+    assert caught.value.data == {"step": -0.5}
+    with pytest.raises(InputError, match="step nan"):
+        interpolate_poses(X, float("nan"))

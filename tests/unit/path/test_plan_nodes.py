@@ -73,6 +73,8 @@ def test_two_millimetres_are_worth_a_path() -> None:
     ) as caught:
         plan_path(seam, PathConfig(start_trim=0.01, end_trim=0.00801))
     assert caught.value.data == {"length": pytest.approx(0.02), "limit": 0.002}
+    with pytest.raises(PathError, match=r"^trims of 0 and 19 mm leave"):
+        plan_path(seam, PathConfig(end_trim=0.019))
     with pytest.raises(PathError, match=r"leave 0\.0 mm"):
         plan_path(seam, PathConfig(start_trim=0.01, end_trim=0.012))
 
@@ -130,3 +132,8 @@ def test_a_torch_leans_60_degrees_at_most(name: str, sign: float) -> None:
     with pytest.raises(ConfigError, match=rf"^{name} = {sign * 1.05:.3g} rad leans over 60 deg$") as caught:
         PathConfig(**{name: sign * 1.05})
     assert caught.value.data == {"key": name, "value": sign * 1.05, "limit": STEEPEST}
+
+
+def test_a_setting_out_of_range_is_told_by_its_whole_name() -> None:
+    with pytest.raises(ConfigError, match=r"^path\.step = 1 m is outside 1e-05 to 0\.01 m$"):
+        PathConfig(step=1.0)
