@@ -26,6 +26,7 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 EXPLAINED = ROOT / "scripts" / "mutants.toml"
@@ -212,9 +213,9 @@ def try_group(group: str, folder: Path, most: int, seed: int) -> Tally:
     return tally
 
 
-def recorded(tallies: dict[str, Tally]) -> dict[str, object]:
+def recorded(tallies: dict[str, Tally]) -> dict[str, Any]:
     """The tallies as they are written."""
-    out: dict[str, object] = json.loads(RECORD.read_text()) if RECORD.exists() else {}
+    out: dict[str, Any] = json.loads(RECORD.read_text()) if RECORD.exists() else {}
     for group, tally in tallies.items():
         out[group] = {
             "made": tally.made,
@@ -226,6 +227,28 @@ def recorded(tallies: dict[str, Tally]) -> dict[str, object]:
     return dict(sorted(out.items()))
 
 
+def page(record: dict[str, Any]) -> str:
+    """The record to read: a table, and what survived with its reason."""
+    lines = [
+        "# Faults that tests notice",
+        "",
+        "Written by `scripts/mutants.py --record`: small faults put into weldsim one at a time, and what the tests made of them.",
+        "",
+        "| modules | faults made | tried | noticed | survived, with a reason | survived |",
+        "|---|---|---|---|---|---|",
+    ]
+    for group, tally in record.items():
+        figures = [tally["made"], tally["tried"], tally["noticed"], len(tally["explained"]), len(tally["survived"])]
+        lines.append(f"| {group} | " + " | ".join(map(str, figures)) + " |")
+    for title, key in (("Survivors that change nothing which matters", "explained"), ("Survivors", "survived")):
+        lines += ["", f"## {title}", ""]
+        for tally in record.values():
+            for mutant in tally[key]:
+                change = " -> ".join(f"`{' '.join(mutant[part].split()) or '(nothing)'}`" for part in ("was", "becomes"))
+                lines.append(f"* {mutant['function']}: {change}" + (f": {mutant['reason']}" if "reason" in mutant else ""))
+    return "\n".join(lines).rstrip() + "\n"
+
+
 def told(mutant: Mutant) -> dict[str, str]:
     return {"function": mutant.function, "was": mutant.was, "becomes": mutant.becomes}
 
@@ -235,7 +258,7 @@ def main() -> int:
     parser.add_argument("groups", nargs="*", metavar="GROUP", help=f"of {', '.join(GROUPS)}; all of them where none is named")
     parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants tried of each module, at most")
     parser.add_argument("--seed", type=int, default=0, help="draws them")
-    parser.add_argument("--record", action="store_true", help=f"write the result to {RECORD.relative_to(ROOT)}")
+    parser.add_argument("--record", action="store_true", help=f"write the result to {RECORD.relative_to(ROOT)} and .md beside it")
     given = parser.parse_args()
     unknown = [group for group in given.groups if group not in GROUPS]
     if unknown:
@@ -252,7 +275,9 @@ def main() -> int:
         for mutant in tally.survived:
             print(f"  survived in {mutant.function}\n    - {mutant.was}\n    + {mutant.becomes}", flush=True)
         if given.record:
-            RECORD.write_text(json.dumps(recorded(tallies), indent=1, ensure_ascii=False) + "\n")
+            record = recorded(tallies)
+            RECORD.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+            RECORD.with_suffix(".md").write_text(page(record))
     return 1 if any(tally.survived for tally in tallies.values()) else 0
 
 
