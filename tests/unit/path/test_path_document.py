@@ -99,8 +99,9 @@ def test_seams_keep_their_numbers_and_those_without_a_path_their_reason() -> Non
         {"id": "seam-5", "length": 0.07, "reason": "too short"},
         {"id": "seam-7", "length": 0.07, "reason": "no path"},
     ]
-    with pytest.raises(InputError, match="1 seams and 2 torch paths"):
+    with pytest.raises(InputError, match="1 seams and 2 torch paths") as caught:
         path_document((seam(),), (path(), path()), {}, {}, "")
+    assert caught.value.data == {"seams": 1}
 
 
 def test_text_has_a_pose_a_line_and_says_the_same() -> None:
@@ -109,7 +110,13 @@ def test_text_has_a_pose_a_line_and_says_the_same() -> None:
     assert lines[2] == '{"s":0.0,"position":[0.0,-0.5,0.1],"quaternion_wxyz":[0.0,1.0,0.0,0.0]},'
     assert json.loads(path_text(document())) == document()
     assert json.loads(path_text(document(), timing=False)) == {**document(), "timing": {}}
-    assert path_text({**document(), "input": {"file": "Grün"}}).isascii() is False
+    assert lines[0].startswith('{"schema":"weldsim.path/1","frame":"base","units":{"length":"m","angle":"rad"},"refused":[],')
+    assert lines[1].startswith('"seams":[{"id":"seam-1","joint":"groove",')
+    assert '"file":"Grün"' in path_text({**document(), "input": {"file": "Grün"}})
+    assert '"id":"Naht ü"' in path_text(changed("seams.0.id", "Naht ü"))
+    for place in ("seams.0.poses.1.s", "seams.0.length", "config_digest"):
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            path_text(changed(place, float("nan")))
 
 
 def test_what_is_read_back_is_a_weld_at_the_seams_speed(tmp_path: Path) -> None:
@@ -221,3 +228,13 @@ def test_what_is_at_its_limit_or_left_out_is_well(place: str, value: Any) -> Non
 def test_what_is_no_document_is_said_so() -> None:
     with pytest.raises(InputError, match=r"^path document: holds no JSON object"):
         check_document([document()])
+
+
+def test_what_cannot_be_read_is_told_with_its_file(tmp_path: Path) -> None:
+    file = tmp_path / "p.json"
+    for text, told in ((None, "cannot be read"), ("{", "is no JSON"), ("[" * 100_000, "is no JSON")):
+        if text is not None:
+            file.write_text(text)
+        with pytest.raises(InputError, match=told) as caught:
+            read_path_json(file)
+        assert caught.value.data == {"path": str(file)}
