@@ -14,15 +14,22 @@ WIDTH, DEPTH, SPACING = 0.012, 0.007, 0.0008  # [m]
 TURNS = (0.0, 2.5)  # [rad] about the vertical: the finder may walk a groove either way
 
 
-def end_errors(start: float, stop: float, low: float, high: float, turn: float) -> tuple[float, float]:
+def end_errors(
+    start: float, stop: float, low: float, high: float, turn: float, *, taper: float = 0.0, unseen: float = 0.0
+) -> tuple[float, float]:
     """How far the seam found runs on beyond either end of a groove along x [m]; less than 0 where it stops short.
 
     Args:
         start, stop: of the groove [m].  low, high: of the plate; a groove that reaches it runs out through its edge.
         turn: of the plate about the vertical [rad].
+        taper: over which the groove loses its depth, half of it before its end and half after [m].
+        unseen: of the groove, lips included, at either end of the plate, where only the plate beside it was seen [m].
     """
     x, y = np.meshgrid(np.arange(low + SPACING / 2, high, SPACING), np.arange(-0.06, 0.06, SPACING))
-    below = DEPTH * np.maximum(1 - np.abs(y) / (WIDTH / 2), 0.0) * ((x > start) & (x < stop))
+    seen = (np.abs(y) > WIDTH / 2 + SPACING / 2) | ((x > low + unseen) & (x < high - unseen))
+    x, y = x[seen], y[seen]
+    share = np.clip(np.minimum(x - start, stop - x) / max(taper, 1e-9) + 0.5, 0.0, 1.0)
+    below = DEPTH * np.maximum(1 - np.abs(y) / (WIDTH / 2), 0.0) * share
     X_BP = Transform("BP", matrix_from_rotation_vector(np.array([0.0, 0.0, turn])), np.array([0.1, -0.5, 0.02]))
     points = X_BP.points(np.stack([x, y, -below], axis=-1).reshape(-1, 3))
     cloud = PointCloud(points=points, viewpoints=X_BP.p[None] + [0.0, 0.0, 0.45])
@@ -36,6 +43,20 @@ def test_a_groove_that_fades_inside_its_plate_ends_where_it_fades() -> None:
     errors = np.array([end_errors(start, stop, -0.1, 0.09, turn) for (start, stop), turn in product(ends, TURNS)])
     assert np.abs(errors).max() < 0.8e-3
     assert np.abs(errors.mean(axis=0)).max() < 0.5e-3, "neither end is drawn out or in"
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_a_groove_that_runs_out_slowly_ends_where_its_depth_halves(turn: float) -> None:
+    before, after = end_errors(-0.0603, 0.0437, -0.1, 0.09, turn, taper=0.016)
+    assert abs(before) < 0.8e-3
+    assert abs(after) < 0.8e-3
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_an_end_that_was_not_seen_is_carried_to_the_plates_edge(turn: float) -> None:
+    before, after = end_errors(-0.0750, 0.0601, -0.0750, 0.0601, turn, unseen=0.006)
+    assert abs(before) < 1.3e-3
+    assert abs(after) < 1.3e-3
 
 
 def test_a_groove_that_leaves_its_plate_ends_at_the_plates_edge() -> None:
