@@ -23,7 +23,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ GROUPS: dict[str, tuple[list[str], list[str]]] = {
     "path": (["path/*"], ["unit/path", "conventions/test_seam.py"]),
     "report": (
         [f"report/{name}" for name in ("limits", "metrics", "tracking", "view", "weld")],
-        ["unit/report", "property/test_metrics.py"],
+        ["unit/report", "unit/path/test_ring.py", "property/test_metrics.py"],
     ),
     "records": (["records/*"], ["unit/test_records.py"]),
     "frames": (
@@ -158,8 +158,13 @@ def read_mutants(folder: Path, names: dict[str, str]) -> Iterator[Mutant]:
     for name, diff in json.loads(done.stdout).items():
         lines = diff.splitlines()[2:]
         was, becomes = ("\n".join(line[1:].strip() for line in lines if line.startswith(sign)) for sign in "-+")
-        function = re.sub(r"__mutmut_\d+$", "", name).replace("xǁ", "").replace("ǁ", ".").replace(".x_", ".")
-        yield Mutant(name, function.removeprefix("weldsim."), was, becomes)
+        yield Mutant(name, function_of(name), was, becomes)
+
+
+def function_of(name: str) -> str:
+    """The function below weldsim that a mutant is of, by mutmut's name."""
+    function = re.sub(r"__mutmut_\d+$", "", name).replace("xǁ", "").replace("ǁ", ".").replace(".x_", ".")
+    return function.removeprefix("weldsim.")
 
 
 def drawn(folder: Path, most: int, seed: int) -> list[Mutant]:
@@ -169,6 +174,17 @@ def drawn(folder: Path, most: int, seed: int) -> list[Mutant]:
         names = sorted(codes)
         random.Random(f"{seed} {module}").shuffle(names)
         out += [mutant for mutant in read_mutants(folder, dict.fromkeys(names[: 3 * most], module)) if not mutant.prose][:most]
+    return out
+
+
+def survivors(folder: Path, group: str) -> list[Mutant]:
+    """The mutants that survived when the group was recorded last, as far as they can still be made."""
+    wanted = json.loads(RECORD.read_text())[group]["survived"]
+    functions = {entry["function"] for entry in wanted}
+    out: list[Mutant] = []
+    for module, codes in exit_codes(folder).items():
+        names = [name for name in codes if function_of(name) in functions]
+        out += [mutant for mutant in read_mutants(folder, dict.fromkeys(names, module)) if told(mutant) in wanted]
     return out
 
 
@@ -182,8 +198,8 @@ def reason(mutant: Mutant, explained: list[dict[str, str]]) -> str | None:
     return None
 
 
-def try_group(group: str, folder: Path, most: int, seed: int) -> Tally:
-    """A group's mutants, made and tried in an empty folder."""
+def try_group(group: str, folder: Path, choose: Callable[[Path], list[Mutant]]) -> Tally:
+    """A group's mutants, made in an empty folder, and those of them tried that `choose` picks there."""
     for name in COPIED:
         source = ROOT / name
         copy = shutil.copytree if source.is_dir() else shutil.copy
@@ -191,11 +207,11 @@ def try_group(group: str, folder: Path, most: int, seed: int) -> Tally:
     (folder / "pyproject.toml").write_text(configuration(group))
     said = mutmut(folder, "run", "--max-children", "1", "none of them")  # makes the mutants and times the tests
     made = {name: code for codes in exit_codes(folder).values() for name, code in codes.items()}
-    chosen = drawn(folder, most, seed)
+    chosen = choose(folder)
+    if not made:
+        sys.exit(f"mutants: {group}: no mutants were made; mutmut says:\n{said[-2000:]}")
     if not chosen:
-        sys.exit(
-            f"mutants: {group}: no mutants were made; mutmut says: {said.strip().splitlines()[-1] if said.strip() else 'nothing'}"
-        )
+        return Tally(made=len(made))
     said = mutmut(folder, "run", "--max-children", "1", *(mutant.name for mutant in chosen))
     codes = {name: code for codes in exit_codes(folder).values() for name, code in codes.items()}
     explained = tomllib.loads(EXPLAINED.read_text())["mutant"]
@@ -213,17 +229,17 @@ def try_group(group: str, folder: Path, most: int, seed: int) -> Tally:
     return tally
 
 
-def recorded(tallies: dict[str, Tally]) -> dict[str, Any]:
-    """The tallies as they are written."""
+def recorded(group: str, tally: Tally, again: bool) -> dict[str, Any]:
+    """All records with a group's new one; `again`: with what has become of its survivors, the others as they were."""
     out: dict[str, Any] = json.loads(RECORD.read_text()) if RECORD.exists() else {}
-    for group, tally in tallies.items():
-        out[group] = {
-            "made": tally.made,
-            "tried": tally.tried,
-            "noticed": tally.noticed,
-            "explained": [{**told(mutant), "reason": why} for mutant, why in tally.explained],
-            "survived": [told(mutant) for mutant in tally.survived],
-        }
+    before = out[group] if again else {"tried": tally.tried, "noticed": 0, "explained": []}
+    out[group] = {
+        "made": tally.made,
+        "tried": before["tried"],
+        "noticed": before["noticed"] + tally.noticed,
+        "explained": before["explained"] + [{**told(mutant), "reason": why} for mutant, why in tally.explained],
+        "survived": [told(mutant) for mutant in tally.survived],
+    }
     return dict(sorted(out.items()))
 
 
@@ -258,6 +274,7 @@ def main() -> int:
     parser.add_argument("groups", nargs="*", metavar="GROUP", help=f"of {', '.join(GROUPS)}; all of them where none is named")
     parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants tried of each module, at most")
     parser.add_argument("--seed", type=int, default=0, help="draws them")
+    parser.add_argument("--again", action="store_true", help="try those alone that survived when it was recorded last")
     parser.add_argument("--record", action="store_true", help=f"write the result to {RECORD.relative_to(ROOT)} and .md beside it")
     given = parser.parse_args()
     unknown = [group for group in given.groups if group not in GROUPS]
@@ -265,20 +282,25 @@ def main() -> int:
         parser.error(f"no group {unknown[0]!r}; there are {', '.join(GROUPS)}")
     if importlib.util.find_spec("mutmut") is None:
         parser.error(f"mutmut is missing: {sys.executable} -m pip install mutmut==3.8.1")
-    tallies: dict[str, Tally] = {}
+    unexplained = 0
     for group in given.groups or GROUPS:
         with tempfile.TemporaryDirectory(prefix="weldsim-mutants-") as folder:
-            tally = tallies[group] = try_group(group, Path(folder), given.sample, given.seed)
+
+            def choose(folder: Path, group: str = group) -> list[Mutant]:
+                return survivors(folder, group) if given.again else drawn(folder, given.sample, given.seed)
+
+            tally = try_group(group, Path(folder), choose)
+        unexplained += len(tally.survived)
         print(
             f"{group}: {tally.tried} of {tally.made} tried, {tally.noticed} noticed, {len(tally.explained)} explained", flush=True
         )
         for mutant in tally.survived:
             print(f"  survived in {mutant.function}\n    - {mutant.was}\n    + {mutant.becomes}", flush=True)
         if given.record:
-            record = recorded(tallies)
+            record = recorded(group, tally, given.again)
             RECORD.write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
             RECORD.with_suffix(".md").write_text(page(record))
-    return 1 if any(tally.survived for tally in tallies.values()) else 0
+    return 1 if unexplained else 0
 
 
 if __name__ == "__main__":

@@ -40,6 +40,16 @@ def test_a_step_becomes_a_turn_at_the_limits_rate_with_its_middle_at_the_step(st
     np.testing.assert_allclose(np.diff(found[turning]) / np.diff(s[turning]), np.sign(step) * rate, rtol=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bump_too_short_for_the_limit_becomes_a_lower_one_about_the_same_place(seed: int) -> None:
+    """Out by 1 rad over 10 mm and back: neither limiter, at twice the rate, gets farther than 0.4 rad; their middle is 0.2."""
+    rate, start, stop = 20.0, 0.10, 0.11
+    s = uneven(0.0, 0.2, seed)
+    found = angle_of(limited(s, leaning(np.where((s >= start) & (s < stop), 1.0, 0.0)), rate))
+    wanted = rate * np.clip(np.minimum(s - (start - 0.01), (stop + 0.01) - s), 0.0, stop - start)
+    np.testing.assert_allclose(found, wanted, atol=2.2e-3 * rate)
+
+
 def test_a_turn_that_obeys_the_limit_is_left_as_it_is() -> None:
     s = np.linspace(0.0, 0.1, 101)
     z = leaning(5.0 * s)
