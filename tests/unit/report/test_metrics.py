@@ -36,8 +36,8 @@ def straight(shift: float = 0.0) -> KnownSeam:
     return KnownSeam(
         opening_B=line,
         root_B=line + 0.008 * DOWN,
-        left_B=line + [0.0, 0.007, 0.0],
-        right_B=line - [0.0, 0.007, 0.0],
+        left_B=line + np.array([0.0, 0.007, 0.0]),
+        right_B=line - np.array([0.0, 0.007, 0.0]),
         tangents_B=np.tile([1.0, 0.0, 0.0], (201, 1)),
         bisectors_B=np.tile(DOWN, (201, 1)),
         s=x,
