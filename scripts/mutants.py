@@ -48,7 +48,7 @@ GROUPS: dict[str, tuple[list[str], list[str]]] = {
         ["property/test_frames.py", "conventions/test_frames.py", "conventions/test_rotations.py", "unit/test_frames.py"],
     ),
     "kinematics": (["kinematics"], ["unit/test_kinematics.py", "unit/test_arm.py"]),
-    "gate": (["execution/gate"], ["unit/execution/test_gate.py"]),
+    "gate": (["execution/gate"], ["unit/execution/test_gate.py", "unit/execution/test_gate_told.py"]),
     "ends": (["seam/profile/ends"], ["unit/seam/test_ends.py"]),
     "window": (["seam/profile/window"], ["unit/seam/test_window.py"]),
     "arm": (["motion/arm"], ["unit/motion/test_arm.py"]),

@@ -225,7 +225,7 @@ def test_a_trajectory_that_does_not_end_at_rest_is_told_at_its_last_instant() ->
     u = np.arange(20)[:, None] * PERIOD
     moving = replace(plan, q=START + 0.5 * 1.0 * u**2 * ELBOW, qd=1.0 * u * ELBOW)
     config = replace(GateConfig(), joint_acceleration=5.0, joint_jerk=1e4)
-    with pytest.raises(ExecutionError, match="^trajectory: joint acceleration: elbow") as caught:
+    with pytest.raises(ExecutionError, match=r"^trajectory: joint acceleration: elbow") as caught:
         ready(Puppet(), steps=0, config=config).check(moving)
     assert caught.value.data["t"] == pytest.approx(19 * PERIOD)
     assert caught.value.data["s"] == pytest.approx(0.019)
