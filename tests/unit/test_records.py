@@ -192,7 +192,9 @@ def built(record: type, **given: Any) -> Any:
     return made
 
 
-@pytest.mark.parametrize(("record", "name", "value", "told"), WRONG, ids=[f"{w[0].__name__}.{w[1]}-{w[3]}" for w in WRONG])
+@pytest.mark.parametrize(
+    ("record", "name", "value", "told"), WRONG, ids=[f"{w[0].__name__}.{w[1]}-{i}" for i, w in enumerate(WRONG)]
+)
 def test_a_wrong_field_is_refused_by_its_name(record: type, name: str, value: Any, told: str) -> None:
     with pytest.raises(RecordError, match=told) as caught:
         built(record, **{**GOOD[record], name: value})
