@@ -33,7 +33,8 @@ EXPLAINED = ROOT / "scripts" / "mutants.toml"
 RECORD = ROOT / "experiments" / "results" / "mutants.json"
 COPIED = ("weldsim", "tests", "assets", "scenes", "experiments", "scripts", "CONVENTIONS.md", "README.md", "CHANGELOG.md")
 SAMPLE = 60  # mutants of one module that are tried
-SURVIVED, NO_TEST = 0, 33  # mutmut's exit codes; timeouts and crashes count as noticed
+SURVIVED = (0, 5, 33)  # mutmut's exit codes: all tests pass, or there is none of it
+OUT_OF_TIME = (36, -24, 24, 152, 255)  # an endless loop, or a busy machine
 
 GROUPS: dict[str, tuple[list[str], list[str]]] = {
     # modules below weldsim/, tests below tests/
@@ -57,8 +58,6 @@ NOT_RUN = {  # tests left out, by parts of their names: they try execution/limit
     "gate": "0.002 or at_its_limit or workspace or joint_position or torch_speed or trails or whole_trajectory or keeps_to_every"
     " or test_stale_state or own_kinematics or black_box_keeps or begins_anew",
 }
-
-
 STRICT = ("strict=None", "strict=False", "")
 
 
@@ -91,11 +90,12 @@ class Mutant:
 
 @dataclass
 class Tally:
-    """What became of a group's mutants: `explained` are (mutant, reason)."""
+    """What became of a group's mutants: `slow` ran out of time, `explained` are (mutant, reason)."""
 
     made: int = 0
     tried: int = 0
     noticed: int = 0
+    slow: list[Mutant] = field(default_factory=list)
     explained: list[tuple[Mutant, str]] = field(default_factory=list)
     survived: list[Mutant] = field(default_factory=list)
 
@@ -181,8 +181,9 @@ def drawn(folder: Path, most: int, seed: int) -> list[Mutant]:
 
 
 def survivors(folder: Path, group: str) -> list[Mutant]:
-    """The mutants that survived when the group was recorded last, as far as they can still be made."""
-    wanted = json.loads(RECORD.read_text())[group]["survived"]
+    """The mutants that survived or ran out of time when the group was recorded last, as far as they can still be made."""
+    last = json.loads(RECORD.read_text())[group]
+    wanted = last["survived"] + last["slow"]
     functions = {entry["function"] for entry in wanted}
     out: list[Mutant] = []
     for module, codes in exit_codes(folder).items():
@@ -223,7 +224,9 @@ def try_group(group: str, folder: Path, choose: Callable[[Path], list[Mutant]]) 
         code = codes[mutant.name]
         if code is None:
             sys.exit(f"mutants: {group}: {mutant.name} was not tried; mutmut says:\n{said[-2000:]}")
-        if code not in (SURVIVED, NO_TEST):
+        if code in OUT_OF_TIME:
+            tally.slow.append(mutant)
+        elif code not in SURVIVED:
             tally.noticed += 1
         elif why := reason(mutant, explained):
             tally.explained.append((mutant, why))
@@ -240,6 +243,7 @@ def recorded(group: str, tally: Tally, again: bool) -> dict[str, Any]:
         "made": tally.made,
         "tried": before["tried"],
         "noticed": before["noticed"] + tally.noticed,
+        "slow": [told(mutant) for mutant in tally.slow],
         "explained": before["explained"] + [{**told(mutant), "reason": why} for mutant, why in tally.explained],
         "survived": [told(mutant) for mutant in tally.survived],
     }
@@ -253,13 +257,14 @@ def page(record: dict[str, Any]) -> str:
         "",
         "Written by `scripts/mutants.py --record`: small faults put into weldsim one at a time, and what the tests made of them.",
         "",
-        "| modules | faults made | tried | noticed | survived, with a reason | survived |",
-        "|---|---|---|---|---|---|",
+        "| modules | faults made | tried | noticed | out of time | survived, with a reason | survived |",
+        "|---|---|---|---|---|---|---|",
     ]
     for group, tally in record.items():
-        figures = [tally["made"], tally["tried"], tally["noticed"], len(tally["explained"]), len(tally["survived"])]
+        figures = [tally["made"], tally["tried"], tally["noticed"], *(len(tally[key]) for key in ("slow", "explained", "survived"))]
         lines.append(f"| {group} | " + " | ".join(map(str, figures)) + " |")
-    for title, key in (("Survivors that change nothing which matters", "explained"), ("Survivors", "survived")):
+    titles = {"survived": "Survivors", "slow": "Out of time", "explained": "Survivors that change nothing which matters"}
+    for key, title in titles.items():
         lines += ["", f"## {title}", ""]
         for tally in record.values():
             for mutant in tally[key]:
@@ -295,7 +300,9 @@ def main() -> int:
             tally = try_group(group, Path(folder), choose)
         unexplained += len(tally.survived)
         print(
-            f"{group}: {tally.tried} of {tally.made} tried, {tally.noticed} noticed, {len(tally.explained)} explained", flush=True
+            f"{group}: {tally.tried} of {tally.made} tried, {tally.noticed} noticed, {len(tally.slow)} out of time,"
+            f" {len(tally.explained)} explained",
+            flush=True,
         )
         for mutant in tally.survived:
             print(f"  survived in {mutant.function}\n    - {mutant.was}\n    + {mutant.becomes}", flush=True)
