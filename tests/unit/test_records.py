@@ -244,6 +244,15 @@ def test_integers_become_the_numbers_the_record_holds() -> None:
     assert cloud.view.dtype == cloud.pixel.dtype == np.int64
 
 
+def test_each_array_has_the_type_of_its_record_whatever_it_was_given() -> None:
+    for record in (TorchPath, JointTrajectory, ExecutionLog):
+        assert built(record, **{**GOOD[record], "arc_on": np.ones(N, int)}).arc_on.dtype == bool
+    frame = built(DepthFrame, **{**GOOD[DepthFrame], "depth": np.ones((3, 5)), "colour": np.zeros((3, 5, 3), int)})
+    assert (frame.depth.dtype, frame.colour.dtype) == (np.float32, np.uint8)
+    for record, name in ((Seam, "s"), (KnownSeam, "s"), (TorchPath, "s"), (JointTrajectory, "t"), (ExecutionLog, "s_cmd")):
+        assert getattr(built(record, **{**GOOD[record], name: np.arange(N), "gaps": ()}), name).dtype == np.float64
+
+
 def test_an_arc_burns_in_weld_alone_and_weld_is_one_stretch() -> None:
     parts = (Segment.APPROACH, Segment.WELD, Segment.WELD, Segment.RETRACT)
     good = {**GOOD[TorchPath], "segments": parts}
