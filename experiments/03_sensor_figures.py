@@ -29,11 +29,11 @@ from numpy import ndarray
 from tests.depth_scenes import FLAT, fillet, points_in_part, profile_depth, profile_scene, v_groove
 from weldsim.frames import Transform
 from weldsim.mounts import D415_640X480 as VGA
+from weldsim.opengl import rendering_backend
 from weldsim.records import CameraIntrinsics
 from weldsim.scene.config import SceneConfig
 from weldsim.scene.world import build_world
 from weldsim.sensor.active_stereo import D415Stereo
-from weldsim.sensor.backend import rendering_backend
 from weldsim.sensor.base import Label, View
 from weldsim.sensor.d415 import D415_1280X720 as HD
 from weldsim.sensor.d415 import D415Config, d415

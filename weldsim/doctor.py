@@ -123,7 +123,7 @@ def remedy_for(distribution: str, failure: str) -> str:
 def check_rendering() -> Check:
     """Which rendering back end draws; without OpenGL the ray-cast one does, so that is no failure."""
     program = (
-        "from weldsim.sensor.backend import backend_failures, rendering_backend\n"
+        "from weldsim.opengl import backend_failures, rendering_backend\n"
         "backend = rendering_backend()\n"
         "if backend == 'embree': import open3d\n"
         "print(backend, *backend_failures().values(), sep='\\n')"

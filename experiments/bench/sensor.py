@@ -13,10 +13,10 @@ from statistics import median
 import numpy as np
 
 from weldsim.mounts import KINECT_V2
+from weldsim.opengl import rendering_backend
 from weldsim.scene.config import SceneConfig
 from weldsim.scene.world import build_world
 from weldsim.sensor.active_stereo import D415Stereo
-from weldsim.sensor.backend import rendering_backend
 from weldsim.sensor.base import DepthSensor, Finish, View
 from weldsim.sensor.choose import posture, stations
 from weldsim.sensor.d415 import D415Config, d415

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import tyro
 
 from weldsim import units
-from weldsim.cli.options import ConfigOptions, choose_platform, refuse_together
+from weldsim.cli.options import ConfigOptions, choose_platform, keep_importable, refuse_together
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.quantities import JOINTS, LEANED, MOVED, TURNED, WELD_SPEED, quantities, quantity
 from weldsim.cli.show import print_json, progress, table
@@ -75,13 +75,13 @@ class DryRunCommand(ConfigOptions):
     """Do not look for changes that would help."""
 
     html: Path | None = None
-    """Where to write a page: verdicts, joint plots, a picture of the first failure."""
+    """Where to write a page: verdicts, joint plots, a picture of the first failure, or of halfway where there is none."""
 
     out: Path | None = None
     """Where to write the dry run as JSON."""
 
     png: Path | None = None
-    """Where to write the picture of the first failure."""
+    """Where to write the picture of the first failure, or of halfway where there is none."""
 
     reach_map: Path | None = None
     """Where to write a picture of the table: where the part could stand so that the whole seam can be welded (first seam)."""
@@ -98,6 +98,7 @@ class DryRunCommand(ConfigOptions):
         check_suffix(self.reach_map, (".png",), "a reach map")
         check_suffix(self.export, (".script", ".urscript"), "a program")
         check_outputs((self.html, self.out, self.png, self.reach_map, self.export), (self.config, self.file, self.arm))
+        _ = choose_platform() if self.draws else keep_importable()
         config = self.cell()
         self._refuse_idle_options()
         change = self._change()
@@ -124,8 +125,6 @@ class DryRunCommand(ConfigOptions):
         if program.kind == "script" and self.arm is not None:
             raise InputError(f"{self.file}: --arm is for paths; the joint angles of a robot program are an arm's own already")
         program, cell = changed(program, cell, change)
-        if self.html is not None or self.png is not None:
-            choose_platform()
         with progress() as tell:
             result = dry_run(program, cell, config.motion, fix=not self.no_fix, tell=tell)
             written, trouble = self._write(result, cell)
@@ -154,6 +153,11 @@ class DryRunCommand(ConfigOptions):
             )
         if kind not in (".csv", ".txt", ".json") and self.roll:
             raise InputError("--roll: changes nothing here: it is for the poses of a CSV")
+
+    @property
+    def draws(self) -> bool:
+        """Whether a picture of the cell was asked for, on a page or alone."""
+        return self.html is not None or self.png is not None
 
     def _change(self) -> "Change":
         import numpy as np
@@ -193,11 +197,9 @@ class DryRunCommand(ConfigOptions):
 
         written, trouble = [], ""
         pictures: tuple[bytes | None, ...] = (None,) * len(result.trials)
-        if self.html is not None or self.png is not None:
+        if self.draws:
             try:
-                pictures = tuple(
-                    None if trial.passed and self.png is None else self._picture(trial, cell) for trial in result.trials
-                )
+                pictures = tuple(self._picture(trial, cell) for trial in result.trials)
             except SensorError as error:
                 trouble = str(error)
         if self.html is not None:

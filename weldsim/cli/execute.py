@@ -9,7 +9,7 @@ import tyro
 
 from weldsim import units
 from weldsim.cli.dry_run import failures
-from weldsim.cli.options import ConfigOptions
+from weldsim.cli.options import ConfigOptions, keep_importable
 from weldsim.cli.outputs import check_folder, nearest_folder, refuse_file
 from weldsim.cli.quantities import SHARE, quantity
 from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
@@ -69,6 +69,8 @@ class Execute(ConfigOptions):
 
     def __call__(self) -> int:
         """0 where the weld was made within every limit, else 1."""
+        keep_importable()
+
         from weldsim.welding.job import JobConfig, weld
 
         if self.host is not None and self.robot != "ur":

@@ -79,7 +79,7 @@ def choose_platform() -> str:
     MuJoCo reads it when it is imported, and without it may take a platform that does not draw; one that is not installed
     keeps it from being imported, so where nothing draws it is set to "disabled". Raises SensorError where it holds nonsense.
     """
-    from weldsim.sensor.backend import rendering_backend
+    from weldsim.opengl import rendering_backend
 
     platform = rendering_backend()
     if platform != "embree":
@@ -87,3 +87,10 @@ def choose_platform() -> str:
     else:
         os.environ["MUJOCO_GL"] = "disabled"
     return platform
+
+
+def keep_importable() -> None:
+    """For commands that need MuJoCo and draw nothing: sets aside a MUJOCO_GL whose platform is not installed, with which
+    MuJoCo could not be imported. Raises SensorError where it holds nonsense."""
+    if os.environ.get("MUJOCO_GL"):
+        choose_platform()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import tyro
 
-from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
+from weldsim.cli.options import ConfigOptions, SceneName, choose_platform, keep_importable
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
@@ -65,6 +65,7 @@ class Scenes(ConfigOptions):
 
     def _export(self) -> int:
         scene, out = self._chosen(".xml", "an MJCF scene")
+        keep_importable()
 
         from weldsim.scene.export import write_plain_scene
 

@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from weldsim.errors import ConfigError, OutputError, SensorError
+from weldsim.errors import ConfigError, OutputError
 from weldsim.execution.simulated import TORCH_SITE, SimulatedRobot
+from weldsim.opengl import open_renderer
 
 BEAD_SPACING, BEAD_RADIUS = 0.0012, 0.0032  # [m]
 COOLING = 4.0  # [s] in which a laid bead goes from white to red heat
@@ -111,10 +112,19 @@ class WeldVideo:
             h, w = views[1].shape[:2]
             picture[MARGIN - EDGE : MARGIN + h + EDGE, -w - MARGIN - EDGE : -MARGIN + EDGE] = 245
             picture[MARGIN : MARGIN + h, -w - MARGIN : -MARGIN] = views[1]
-        text = f"{robot.t:5.1f} s   arc {'on' if robot.arc else 'off'}"
-        where, font = (24, 44), cv2.FONT_HERSHEY_SIMPLEX
-        cv2.putText(picture, text, where, font, 0.9, (20, 22, 26), 2, cv2.LINE_AA)
+        for line, size, where in ((self._clock(robot), 0.9, (24, 44)), (self.pace, 0.6, (24, 74))):
+            cv2.putText(picture, line, where, cv2.FONT_HERSHEY_SIMPLEX, size, (20, 22, 26), 2, cv2.LINE_AA)
         return picture
+
+    @property
+    def pace(self) -> str:
+        """How fast the film runs, in words: what is written into every picture."""
+        speedup = self.config.speedup
+        return "at true speed" if speedup == 1 else f"{speedup:g} x as fast" if speedup > 1 else f"slowed to {100 * speedup:g} %"
+
+    @staticmethod
+    def _clock(robot: SimulatedRobot) -> str:
+        return f"{robot.t:5.1f} s   arc {'on' if robot.arc else 'off'}"
 
     def _open(self, robot: SimulatedRobot) -> None:
         config, model = self.config, robot.model
@@ -127,13 +137,13 @@ class WeldVideo:
         visual.quality.numslices, visual.quality.numstacks = 16, 8
         model.mat_reflectance[:] = 0.0
         visual.quality.offsamples = 0
-        self._renderers.append((config.camera, _renderer(model, height, width)))
+        self._renderers.append((config.camera, open_renderer(model, height, width, "video")))
         if config.inset:
             follower = mujoco.MjvCamera()
             follower.type = mujoco.mjtCamera.mjCAMERA_FREE
             visual.quality.offsamples = INSET_SAMPLES
             follower.azimuth, follower.elevation, follower.distance = CLOSE_UP
-            self._renderers.append((follower, _renderer(model, config.height * 2 // 5, config.width * 3 // 10)))
+            self._renderers.append((follower, open_renderer(model, config.height * 2 // 5, config.width * 3 // 10, "video")))
 
     def _lay_bead(self, robot: SimulatedRobot) -> None:
         """Balls from the last one to the tip while the arc burns."""
@@ -156,20 +166,6 @@ class WeldVideo:
             _ball(scene, tip, 0.0045, [1.0, 1.0, 0.97, 1.0], emission=1.0)
             for radius, alpha in ((0.010, 0.35), (0.018, 0.18), (0.030, 0.08)):
                 _ball(scene, tip, radius, [0.75, 0.87, 1.0, alpha], emission=1.0)
-
-
-def _renderer(model: Any, height: int, width: int) -> Any:
-    """MuJoCo's renderer. Raises SensorError where there is no OpenGL."""
-    try:
-        return mujoco.Renderer(model, height, width)
-    except (AttributeError, ImportError, RuntimeError, mujoco.FatalError) as error:
-        # Without a back end, MuJoCo fails in whichever way its platform does: a missing context class among them.
-        raise SensorError(
-            f"video: no OpenGL back end ({type(error).__name__}: {error}); `weldsim doctor` says what is missing,"
-            " or leave the video out",
-            backend=os.environ.get("MUJOCO_GL", ""),
-            reason=str(error),
-        ) from error
 
 
 def _shown() -> Any:

@@ -9,8 +9,8 @@ from numpy import ndarray
 
 from weldsim.errors import SensorError
 from weldsim.frames import Transform
+from weldsim.opengl import Backend
 from weldsim.records import CameraIntrinsics, DepthFrame
-from weldsim.sensor.backend import Backend
 from weldsim.sensor.base import Capture, DepthSensor, Finish, Label, Truth, View
 from weldsim.sensor.renderer import make_renderer
 

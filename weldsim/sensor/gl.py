@@ -14,8 +14,8 @@ from jaxtyping import Float32, Int32, UInt8
 from numpy import ndarray
 
 from weldsim.frames import Transform
+from weldsim.opengl import GlPlatform, gl_context_class
 from weldsim.records import CameraIntrinsics
-from weldsim.sensor.backend import GlPlatform, gl_context_class
 from weldsim.sensor.renderer import VISIBLE_GROUPS, Render, Renderer
 
 NEAR, FAR = 0.01, 50.0  # [m] with reversed z their ratio costs no precision

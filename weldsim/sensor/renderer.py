@@ -10,8 +10,8 @@ from numpy import ndarray
 
 from weldsim.errors import SensorError
 from weldsim.frames import Transform
+from weldsim.opengl import Backend, backend_failures, rendering_backend
 from weldsim.records import CameraIntrinsics
-from weldsim.sensor.backend import Backend, backend_failures, rendering_backend
 
 if TYPE_CHECKING:
     import mujoco

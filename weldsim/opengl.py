@@ -93,7 +93,7 @@ def _try_here(platform: GlPlatform) -> str | None:
 
 def _try_apart(platform: GlPlatform) -> str | None:
     """The same in a new process, which may even crash."""
-    code = f"from weldsim.sensor.backend import draw_once; draw_once({platform!r})"
+    code = f"from weldsim.opengl import draw_once; draw_once({platform!r})"
     environ = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:
         child = subprocess.run(
@@ -119,3 +119,32 @@ def draw_once(platform: GlPlatform) -> None:
         drawing.free()
     finally:
         context.free()
+
+
+def open_renderer(model: Any, height: int, width: int, what: str) -> Any:
+    """MuJoCo's own renderer of a model, on the platform that draws here, whatever MUJOCO_GL was when mujoco was imported.
+
+    Args:
+        height, width: of the picture [px].  what: is to be drawn, for the error.
+    Raises:
+        SensorError: no OpenGL platform draws here.
+    """
+    import mujoco
+
+    platform, failures = probe()
+    if platform != "embree":
+        chosen: Any = importlib.import_module(mujoco.Renderer.__module__).gl_context
+        had = getattr(chosen, "GLContext", None)
+        chosen.GLContext = gl_context_class(platform)
+        try:
+            return mujoco.Renderer(model, height, width)
+        except (AttributeError, ImportError, RuntimeError, mujoco.FatalError) as error:  # as its platform likes to fail
+            failures = ((platform, " ".join(f"{type(error).__name__}: {error}".split())[:300]),)
+        finally:
+            chosen.GLContext = had
+    reason = "; ".join(f"{name}: {why}" for name, why in failures) or f"MUJOCO_GL is {os.environ.get('MUJOCO_GL', 'unset')}"
+    raise SensorError(
+        f"{what}: no OpenGL back end ({reason}); `weldsim doctor` says what is missing, or leave it out",
+        backend=os.environ.get("MUJOCO_GL", ""),
+        reason=reason,
+    )

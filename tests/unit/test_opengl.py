@@ -7,12 +7,12 @@ import sys
 import pytest
 
 from weldsim.errors import SensorError
-from weldsim.sensor.backend import gl_candidates, rendering_backend
+from weldsim.opengl import gl_candidates, rendering_backend
 
 PROBE = """
 from tests.twin_scenes import camera_above, grooved_scene
 from weldsim.mounts import D415_640X480
-from weldsim.sensor.backend import backend_failures, rendering_backend
+from weldsim.opengl import backend_failures, rendering_backend
 from weldsim.sensor.renderer import make_renderer
 scene = grooved_scene()
 depth = make_renderer(scene.model).render(scene.data, camera_above(0), D415_640X480).depth
