@@ -87,7 +87,12 @@ class Run(ConfigOptions):
         if self.json:
             self._print_json(result.report, limits, written, kept)
         else:
-            self._print(result.report, limits, len(result.plan.findings.seams), (*result.world.workpiece.notes, *notes(result)))
+            self._print(
+                result.report,
+                limits,
+                len(result.plan.findings.seams),
+                (*result.world.workpiece.notes, *result.world.notes, *notes(result)),
+            )
             print_written(written, kept)
         return 0 if result.report.passed else 1
 

@@ -79,7 +79,7 @@ class Scan(ConfigOptions):
         print(f"{scene.name}, seed {self.seed}, {captures[0].frame.source}: {len(cloud)} points from {len(captures)} view(s)")
         for i, (x, y, z) in enumerate(cloud.viewpoints, start=1):
             print(f"  view {i} from ({x:.4f}, {y:.4f}, {z:.4f}) m in the base")
-        for line in (*seen.world.workpiece.notes, *lines(found)):
+        for line in (*seen.world.workpiece.notes, *seen.world.notes, *lines(found)):
             print(f"  {line}")
         for name in written:
             print(f"  wrote {name}")

@@ -55,12 +55,17 @@ class Scenes(ConfigOptions):
         choose_platform()
 
         from weldsim.output import write_whole
+        from weldsim.scene.world import build_world
         from weldsim.sensor.portrait import portrait
 
         with progress() as tell:
             tell("drawing", None)
-            picture = portrait(scene)
+            world = build_world(scene)
+            picture = portrait(world)
         write_whole(out, picture)
+        if not self.json:
+            for note in world.notes:
+                print(f"  {note}")
         return self._wrote(scene, out)
 
     def _export(self) -> int:

@@ -28,11 +28,13 @@ def changed(program: Program, cell: Cell, change: Change) -> tuple[Program, Cell
     """The program and the cell with the change made: all its welds, or all its poses.
 
     Raises:
-        InputError: a change that a robot program cannot be given, or a speed of zero or less.
+        InputError: a change that a robot program cannot be given, a speed of zero or less, or a place where the part cannot stand.
     """
     if change.speed is not None and not change.speed > 0:
         raise InputError(f"--speed: {change.speed:g} m/s must be over 0", value=change.speed)
     move = None if change.move is None else np.array([*change.move, 0.0])
+    if move is not None and (fault := cell.misplaced(move)) is not None:
+        raise InputError(f"--move {_said(move)}: {fault}; {_instead(cell, move)}", value=move[:2].tolist(), fault=fault)
     if program.kind == "script":
         if change.lean is not None or change.speed is not None:
             raise InputError(f"{program.source}: --lean and --speed are for paths; a robot program names its own")
@@ -40,6 +42,16 @@ def changed(program: Program, cell: Cell, change: Change) -> tuple[Program, Cell
     else:
         program = replace(program, paths=tuple(_changed_path(path, change, move) for path in program.paths))
     return program, cell if move is None else cell.moved(move)
+
+
+def _said(move: Float[ndarray, "_"]) -> str:
+    return f'"{1e3 * move[0]:.10g} mm, {1e3 * move[1]:.10g} mm"'
+
+
+def _instead(cell: Cell, move: Float[ndarray, "3"]) -> str:
+    """What to do about a move to where the part cannot stand."""
+    place = cell.clear_place(move)
+    return "leave the part where it is" if place is None else f"it can stand at {_said(place)}"
 
 
 def _changed_path(path: TorchPath, change: Change, move: Float[ndarray, "3"] | None) -> TorchPath:

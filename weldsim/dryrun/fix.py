@@ -24,6 +24,7 @@ from weldsim.motion.cut import cut_path
 from weldsim.motion.rungs import turned
 from weldsim.mounts import X_FT
 from weldsim.records import Segment, TorchPath
+from weldsim.scene.cell import TABLE
 
 TURNS = np.deg2rad([s * a for a in (5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 105, 120, 135, 150, 165, 180) for s in (1, -1)])
 LEANS = np.deg2rad([5.0, 10.0, 15.0, 20.0, 30.0])
@@ -32,7 +33,6 @@ LOOSE = re.compile(r"clamp_(bolt_)?\d+")  # names of what can be taken away begi
 DISTANCES = (0.01, 0.02, 0.03, 0.05, 0.075, 0.10, 0.15, 0.20, 0.25, 0.30, 0.40, 0.50)  # [m] the part is moved by, tried in order
 HEADINGS = 12  # directions on the table
 CLOSE = 0.005  # [m] to which the nearest place that does is found
-TABLE = np.array([[-0.60, -0.84], [0.60, 0.20]])  # [m] the table top in B
 FULL_TRIES = 4  # whole checks of changes that passed the coarse look
 WORK = 2.0  # [m] of path in all the whole checks of one kind of change: long paths have fewer
 CANDIDATES = 3  # ways to hold the arm in such a check: what passes with the best of them passes
@@ -191,14 +191,16 @@ def _move(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell:
     tries, least = 0, 0.0
     for k, move in enumerate(candidates(path.X_BT.p)):
         tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
-        if np.linalg.norm(move) < least or not _quick(_with(path, X_BT=shifted(path.X_BT, move)), trial, cell.moved(move), config):
+        if np.linalg.norm(move) < least or cell.misplaced(move, path.X_BT.p) is not None:
+            continue
+        if not _quick(_with(path, X_BT=shifted(path.X_BT, move)), trial, cell.moved(move), config):
             continue
         nearest = _nearest(path, trial, move, cell, config)
         longer = nearest * (1.0 + FARTHER / float(np.linalg.norm(nearest)))
         for way in (nearest, longer if tries == 0 else move):
             way = told(way)
             if passes(path, way, trial.name, cell, config):
-                return [moved_fix(way, cell.place)]
+                return [moved_fix(way, cell.place, cell.shift)]
             if (tries := tries + 1) >= _tries(path, MOVE_TRIES):
                 return []
             length = float(np.linalg.norm(way))
@@ -216,12 +218,16 @@ def told(move: Float[ndarray, "3"]) -> Float[ndarray, "3"]:
     return np.round(move, 4) + 0.0
 
 
-def moved_fix(move: Float[ndarray, "3"], place: tuple[float, float] | None = None) -> Fix:
-    """The change of place in words; place, where the scene has the part now [m]."""
+def moved_fix(move: Float[ndarray, "3"], place: tuple[float, float] | None = None, shift: tuple[float, float] = (0.0, 0.0)) -> Fix:
+    """The change of place in words.
+
+    Args:
+        place: where the part is now [m].  shift: what it has been moved by already [m]: the option tells both together.
+    """
     x, y = 1e3 * move[0], 1e3 * move[1]
     distance = 1e3 * float(np.linalg.norm(move))
     text = f"move the part by {distance:.0f} mm: ({x:+.0f}, {y:+.0f}) mm along x and y of the base"
-    how = f'--move "{x:.1f} mm, {y:.1f} mm"'
+    how = f'--move "{x + 1e3 * shift[0]:.1f} mm, {y + 1e3 * shift[1]:.1f} mm"'
     if place is not None:
         there = 1e3 * (np.array(place) + move[:2])
         how += f'; once the part is there, in the scene\'s [pose]: x = "{there[0]:.1f} mm", y = "{there[1]:.1f} mm"'
@@ -239,7 +245,9 @@ def _leaving_out(cell: Cell, away: list[str]) -> str:
 
 
 def passes(path: TorchPath, move: Float[ndarray, "3"], name: str, cell: Cell, config: MotionConfig) -> bool:
-    """Whether the whole check passes with the part moved [m]."""
+    """Whether the part can stand where it is moved [m], and the whole check passes there."""
+    if cell.misplaced(move) is not None:
+        return False
     return try_path(_with(path, X_BT=shifted(path.X_BT, move)), name, cell.moved(move), config).passed
 
 
@@ -302,11 +310,13 @@ def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress 
     for k, move in enumerate(candidates(points)):
         tell(min(0.95, k / (len(DISTANCES) * HEADINGS)))
         move = told(move)
+        if cell.misplaced(move) is not None:
+            continue
         changed, there = changed_program(program, move=move), cell.moved(move)
         if not _held(changed, failure.index, there):
             continue
         if try_script(changed, there).passed:
-            found.append(moved_fix(move, cell.place))
+            found.append(moved_fix(move, cell.place, cell.shift))
             break
         if (tries := tries + 1) >= FULL_TRIES:
             break

@@ -10,12 +10,12 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell, shifted
-from weldsim.dryrun.fix import TABLE
 from weldsim.dryrun.sieve import quick
 from weldsim.errors import MotionError
 from weldsim.motion.config import MotionConfig
 from weldsim.records import TorchPath
 from weldsim.report.style import BAD, GOOD, GRID, INK, SEAM, SOFT
+from weldsim.scene.cell import TABLE
 
 PITCH = 0.05  # [m] between places
 
@@ -26,7 +26,8 @@ class ReachMap:
 
     Attributes:
         x, y: (c,), (r,) of the middle of the seam in B [m].  good: (r, c) whether the whole seam can be welded there.
-        tried: (r, c) whether the seam lies over the table there.  now: (2,) where its middle is [m].
+        tried: (r, c) whether part and fixture can stand there: on the table, clear of the arm's base; good places are among them.
+        now: (2,) where its middle is [m].
         points_B: (n, 3) the seam where it is [m].
     """
 
@@ -39,7 +40,7 @@ class ReachMap:
 
     @property
     def share(self) -> float:
-        """Of the places tried, how many are good."""
+        """Of the places where the part can stand, how many are good."""
         return float(self.good.sum() / max(1, self.tried.sum()))
 
 
@@ -68,12 +69,14 @@ def reach_map(
         for k in range(2)
     ]
     x, y = axes
-    good = np.zeros((len(y), len(x)), bool)
+    good, tried = np.zeros((len(y), len(x)), bool), np.zeros((len(y), len(x)), bool)
     for i, at_y in enumerate(y):
         tell(i / len(y))
         for j, at_x in enumerate(x):
-            good[i, j] = _weldable(path, np.array([at_x - now[0], at_y - now[1], 0.0]), cell, config)
-    return ReachMap(x=x, y=y, good=good, tried=np.ones(good.shape, bool), now=now, points_B=points)
+            move = np.array([at_x - now[0], at_y - now[1], 0.0])
+            tried[i, j] = cell.misplaced(move, points) is None
+            good[i, j] = tried[i, j] and _weldable(path, move, cell, config)
+    return ReachMap(x=x, y=y, good=good, tried=tried, now=now, points_B=points)
 
 
 def _weldable(path: TorchPath, move: Float[ndarray, "3"], cell: Cell, config: MotionConfig) -> bool:
@@ -103,6 +106,7 @@ def reach_json(found: ReachMap) -> dict[str, Any]:
         "x": np.round(found.x, 6).tolist(),
         "y": np.round(found.y, 6).tolist(),
         "weldable": found.good.tolist(),
+        "can_stand": found.tried.tolist(),
         "now": np.round(found.now, 6).tolist(),
         "share": round(found.share, 4),
     }
@@ -123,8 +127,11 @@ def reach_picture(found: ReachMap, name: str) -> bytes:
     axes.scatter(
         gx[found.good], gy[found.good], s=95, marker="s", color=GOOD, alpha=0.75, label="whole seam weldable", linewidths=0
     )
-    bad = ~found.good
-    axes.scatter(gx[bad], gy[bad], s=26, marker="x", color=BAD, alpha=0.7, label="not weldable")
+    for which, mark, colour, name_of in (
+        (found.tried & ~found.good, "x", BAD, "not weldable"),
+        (~found.tried, ".", SOFT, "part cannot stand there"),
+    ):
+        axes.scatter(gx[which], gy[which], s=26, marker=mark, color=colour, alpha=0.7, label=name_of)
     axes.plot(1e3 * found.points_B[:, 0], 1e3 * found.points_B[:, 1], color=SEAM, lw=3, label="the seam as it is")
     axes.plot(*(1e3 * found.now), "o", color=SEAM, ms=7)
     axes.add_patch(Circle((0, 0), 76, facecolor="#c9d3dc", edgecolor=INK))
@@ -136,8 +143,8 @@ def reach_picture(found: ReachMap, name: str) -> bytes:
     axes.grid(color=GRID, lw=0.6)
     axes.set_xlabel("x of the seam's middle in the base [mm]")
     axes.set_ylabel("y [mm]")
-    axes.set_title(f"{name}: {100 * found.share:.0f} % of the places on the table would do", loc="left", color=INK)
-    axes.legend(loc="upper right", ncols=3, fontsize=8, framealpha=1)
+    axes.set_title(f"{name}: {100 * found.share:.0f} % of the places where it can stand would do", loc="left", color=INK)
+    axes.legend(loc="upper right", ncols=4, fontsize=8, framealpha=1)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": "weldsim"})
     return buffer.getvalue()

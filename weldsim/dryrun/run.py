@@ -37,4 +37,6 @@ def dry_run(
         followed, trial = try_waypoints(path, name, cell, config)
         trials.append(trial)
         fixes.append(fixes_for_path(followed, trial, cell, config, lambda done: tell("fixes", done)) if fix else ())
-    return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=program.notes)
+    return DryRun(
+        source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=(*program.notes, *cell.notes)
+    )

@@ -10,6 +10,8 @@ from weldsim.scene.files import asset_path
 from weldsim.scene.shapes import Spec, box, camera, look_at, rod
 
 TABLE_TOP = 0.75  # [m] above the floor; B's z = 0
+TABLE = np.array([[-0.60, -0.84], [0.60, 0.20]])  # [m] lowest and highest x and y of its top, in B
+BASE_GEOM = "base_collision"  # what stands for the arm's base
 
 MATERIALS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     # name: colour, specular, shininess
@@ -133,7 +135,8 @@ def _add_table(spec: Spec) -> None:
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[0.0, 0.32, 0.0], size=[2.2, 2.2, 0.1], contype=1, conaffinity=1
     )
     floor.material = "floor"
-    middle, half = np.array([0.0, 0.32, TABLE_TOP - 0.02]), np.array([0.60, 0.52, 0.02])
+    corners = X_WB.points(np.column_stack([TABLE, [-0.04, 0.0]]))
+    middle, half = corners.mean(axis=0), np.ptp(corners, axis=0) / 2
     box(world, "table", middle, half, "table_top", collide=True)
     for i, (sx, sy) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
         x, y = middle[0] + sx * (half[0] - 0.05), middle[1] + sy * (half[1] - 0.05)

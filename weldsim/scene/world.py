@@ -20,6 +20,7 @@ from weldsim.scene.mesh_cache import cached_mesh
 from weldsim.scene.miscalibration import TwinConfig
 from weldsim.scene.quiet import keep_quiet
 from weldsim.scene.shapes import Group, box, mesh_geom
+from weldsim.scene.standing import Standing
 from weldsim.scene.tool import add_tool
 from weldsim.scene.workpieces.base import Workpiece
 
@@ -45,6 +46,7 @@ class World:
         twin: how the cell differs from what its software believes.
         labels: {geom id: what it belongs to}, for every geom.
         qpos, dof, actuators: (6,) indices of the arm's joints in qpos, in qvel, and of its servos in ctrl.
+        notes: what is odd about how the part stands, a clause each: it hangs in the air, say.
     """
 
     config: SceneConfig
@@ -60,6 +62,7 @@ class World:
     qpos: Int[ndarray, "6"]
     dof: Int[ndarray, "6"]
     actuators: Int[ndarray, "6"]
+    notes: tuple[str, ...] = ()
 
     def new_data(self, q: Float[ndarray, "6"] = HOME) -> Any:
         """A fresh simulation state with the arm at rest at q [rad], servos holding it there."""
@@ -138,7 +141,7 @@ def build_world(
         intrinsics: of the wrist camera's depth image.
         twin: how the cell differs from what its software believes.
     Raises:
-        SceneError: a scene that contradicts itself.
+        SceneError: a scene that contradicts itself, or a part that stands in the arm's base or beside the table.
     """
     if not config.views:
         raise SceneError(f"scene {config.name!r}: no scan view; give one at least", scene=config.name, key="views")
@@ -146,6 +149,8 @@ def build_world(
     workpiece = make_workpiece(config)
     X_BP = part_pose(config.pose, workpiece)
     model = compose(config, workpiece, X_BP, intrinsics, twin).compile()
+    standing = Standing(model=model)
+    _check_standing(config, standing)
     joints = [model.joint(name) for name in JOINT_NAMES]
     return World(
         config=config,
@@ -161,7 +166,21 @@ def build_world(
         qpos=np.array([joint.qposadr[0] for joint in joints]),
         dof=np.array([joint.dofadr[0] for joint in joints]),
         actuators=np.array([model.actuator(name).id for name in JOINT_NAMES]),
+        notes=standing.notes,
     )
+
+
+def _check_standing(config: SceneConfig, standing: Standing) -> None:
+    """Raises SceneError where part or fixture cannot stand, with the nearest place where they can."""
+    if (fault := standing.fault()) is None:
+        return
+    move = standing.clear_place()
+    if move is None:
+        advice = "turn it (pose.yaw) or take a smaller part"
+    else:
+        x, y = 1e3 * (np.array([config.pose.x, config.pose.y]) + move)
+        advice = f'pose.x = "{x:.10g} mm" and pose.y = "{y:.10g} mm" would do'
+    raise SceneError(f"pose of scene {config.name!r}: {fault}; {advice}", scene=config.name, key="pose", fault=fault)
 
 
 def compose(

@@ -4,14 +4,13 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float32, UInt8
 from numpy import ndarray
 
 from weldsim.frames import Transform
 from weldsim.mounts import KINECT_V2, X_WC_KINECT
 from weldsim.records import CameraIntrinsics
-from weldsim.scene.config import SceneConfig
-from weldsim.scene.world import HOME, build_world
+from weldsim.scene.world import HOME
 from weldsim.sensor.renderer import OPTICAL_FROM_MUJOCO, Renderer, make_renderer
 
 if TYPE_CHECKING:
@@ -19,22 +18,21 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 1280, 960
 EDGE = 8  # [px] between the pictures
+FONT, WHITE, DARK = cv2.FONT_HERSHEY_SIMPLEX, (255, 255, 255), (20, 20, 20)
 ROWS = 3  # of views in a column, at most
 ASIDE = HOME + np.array([np.pi, 0.0, 0.0, 0.0, 0.0, 0.0])  # [rad] the arm turned away from the table
 
 Picture = UInt8[ndarray, "_ _ 3"]
 
 
-def portrait(scene: SceneConfig, camera: str = "overview", view: int = 0) -> bytes:
-    """A PNG: the cell with the arm at a scan view, seen by one of its cameras, and what every camera sees.
+def portrait(world: "World", camera: str = "overview", view: int = 0) -> bytes:
+    """A PNG of a scene: the cell with the arm at a scan view, seen by one of its cameras, and what every camera sees.
 
     The wrist camera's pictures are taken with the arm where it holds the camera, the overhead camera's with it turned away.
 
     Raises:
-        SceneError: a scene that contradicts itself.  ViewError: a view that the arm cannot take.
-        SensorError: nothing draws here.
+        ViewError: a view that the arm cannot take.  SensorError: nothing draws here.
     """
-    world = build_world(scene)
     renderer = make_renderer(world.model)
     try:
         data = world.new_data(world.view_joints(view))
@@ -62,11 +60,31 @@ def _pair(
         raise AssertionError("a renderer that was asked for colour gave none")
     height = (HEIGHT - (rows - 1) * EDGE) // rows
     side = (round(height * intrinsics.width / intrinsics.height), height)
-    colour, depth = (cv2.resize(image, side, interpolation=cv2.INTER_AREA) for image in (seen.colour, _shaded(seen.depth)))
-    (wide, high), below = cv2.getTextSize(caption, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)
-    cv2.rectangle(colour, (0, 0), (wide + 16, high + below + 10), (255, 255, 255), cv2.FILLED)
-    cv2.putText(colour, caption, (8, high + 6), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (20, 20, 20), 1, cv2.LINE_AA)
+    low, high = depth_range(seen.depth)
+    pictures = (seen.colour, _shaded(seen.depth, low, high))
+    colour, depth = (cv2.resize(image, side, interpolation=cv2.INTER_AREA) for image in pictures)
+    _caption(colour, caption)
+    _scale(depth, low, high)
     return colour, depth
+
+
+def _caption(picture: Picture, text: str) -> None:
+    """`text` in the upper left corner."""
+    (wide, high), below = cv2.getTextSize(text, FONT, 0.6, 1)
+    cv2.rectangle(picture, (0, 0), (wide + 16, high + below + 10), WHITE, cv2.FILLED)
+    cv2.putText(picture, text, (8, high + 6), FONT, 0.6, DARK, 1, cv2.LINE_AA)
+
+
+def _scale(picture: Picture, low: float, high: float) -> None:
+    """What the colours of a depth picture mean, in its lower left corner: a bar from `low` to `high` [m]."""
+    ends = [f"{low:.2f} m", f"{high:.2f} m"]
+    (wide, tall), _ = cv2.getTextSize(ends[1], FONT, 0.5, 1)
+    bar, left, bottom = 110, 8, picture.shape[0] - 8
+    cv2.rectangle(picture, (0, bottom - tall - 10), (left + 2 * wide + bar + 24, picture.shape[0]), WHITE, cv2.FILLED)
+    cv2.putText(picture, ends[0], (left, bottom - 1), FONT, 0.5, DARK, 1, cv2.LINE_AA)
+    cv2.putText(picture, ends[1], (left + wide + bar + 16, bottom - 1), FONT, 0.5, DARK, 1, cv2.LINE_AA)
+    depths = np.broadcast_to(np.linspace(low, high, bar, dtype=np.float32), (tall, bar))
+    picture[bottom - tall : bottom, left + wide + 8 : left + wide + 8 + bar] = _shaded(depths, low, high)
 
 
 def _columns(pairs: list[tuple[Picture, Picture]]) -> list[Picture]:
@@ -98,12 +116,17 @@ def _camera_intrinsics(world: "World", camera: str) -> CameraIntrinsics:
     return CameraIntrinsics(width=WIDTH, height=HEIGHT, fx=f, fy=f, cx=WIDTH / 2, cy=HEIGHT / 2)
 
 
-def _shaded(depth: np.ndarray) -> np.ndarray:
-    """Depth as colours, near bright, no return black; the range is that of what is nearest: all within twice that distance."""
+def depth_range(depth: Float32[ndarray, "h w"]) -> tuple[float, float]:
+    """The depths [m] that colours are spread over: those of what is nearest, all within twice that distance."""
     seen = np.isfinite(depth)
     low = float(np.percentile(depth[seen], 2)) if seen.any() else 0.0
     near = seen & (depth < 2 * low)
-    high = float(np.percentile(depth[near], 98)) if near.any() else low + 1.0
+    return low, float(np.percentile(depth[near], 98)) if near.any() else low + 1.0
+
+
+def _shaded(depth: Float32[ndarray, "h w"], low: float, high: float) -> Picture:
+    """Depth as colours, near bright, no return black."""
+    seen = np.isfinite(depth)
     level = np.clip((high - np.where(seen, depth, high)) / max(high - low, 1e-6), 0, 1)
     colours = cv2.applyColorMap((level * 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
     colours[~seen] = 0
