@@ -112,7 +112,9 @@ BAD = {
     "seam off the part": ("off the part", {"seam": "far.csv"}, {}),
     "unknown unit": ("not one of", {"units": "yard"}, {}),
     "unknown key": ("unknown", {"untis": "mm"}, {}),
-    "unreachable pose": ("scan view 0", {}, {"pose": {"y": "-2 m"}}),
+    "unreachable pose": ("scan view 0", {}, {"pose": {"x": "400 mm", "y": "-600 mm", "clearance": "700 mm"}}),
+    "beside the table": ("beyond the table's edge", {}, {"pose": {"y": "-2 m"}}),
+    "in the base": ("inside the arm's base", {}, {"pose": {"y": "-20 mm"}}),
     "below the table": ("below the table", {}, {"pose": {"z": "-100 mm"}}),
 }
 

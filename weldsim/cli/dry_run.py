@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from weldsim.arm import Arm
     from weldsim.dryrun.cell import Cell
     from weldsim.dryrun.change import Change
+    from weldsim.dryrun.margin import Margin
     from weldsim.dryrun.verdict import DryRun, Trial, Verdict
     from weldsim.motion.config import MotionConfig
     from weldsim.records import TorchPath
@@ -127,7 +128,7 @@ class DryRunCommand(ConfigOptions):
         program, cell = changed(program, cell, change)
         with progress() as tell:
             result = dry_run(program, cell, config.motion, fix=not self.no_fix, tell=tell)
-            written, trouble = self._write(result, cell)
+            written, trouble = self._write(result, cell, config.motion.joint_speed_limit)
             extra: dict[str, Any] = {}
             if self.reach_map is not None:
                 extra = {"reach_map": self._map(program.paths[0], cell, config.motion, lambda done: tell("reach map", done))}
@@ -188,8 +189,8 @@ class DryRunCommand(ConfigOptions):
             raise InputError(f"--arm {file}: {1e3 * off:.0f} mm from a nominal UR5 (limit {1e3 * ANOTHER:g} mm): it is another arm")
         return found
 
-    def _write(self, result: "DryRun", cell: "Cell") -> tuple[list[Path], str]:
-        """What was written, and why a picture was not."""
+    def _write(self, result: "DryRun", cell: "Cell", speed_limit: float) -> tuple[list[Path], str]:
+        """What was written, and why a picture was not. Args: speed_limit of the joints [rad/s]."""
         import json
 
         from weldsim.dryrun.verdict import dry_run_json
@@ -205,7 +206,7 @@ class DryRunCommand(ConfigOptions):
         if self.html is not None:
             from weldsim.dryrun.page import write_page
 
-            written.append(write_page(self.html, result, pictures))
+            written.append(write_page(self.html, result, pictures, speed_limit=speed_limit))
         if self.png is not None:
             failed = next((i for i, trial in enumerate(result.trials) if not trial.passed), 0)
             if (png := pictures[failed]) is not None:
@@ -258,6 +259,8 @@ class DryRunCommand(ConfigOptions):
             print(f"  {trial.name}: {len(trial.verdicts)} waypoints, {units.to_mm(trial.length):.0f} mm, {state}")
             if rows := failures(trial):
                 print(table(rows, ("waypoint", "s", "verdict", "reason")))
+            if trial.margins:
+                print(table([_margin_row(margin) for margin in trial.margins], ("figure", "worst", "limit", "at", "")))
             for fix in fixes:
                 print(f"  would pass: {fix.text}")
                 print(f"    with {fix.how}")
@@ -287,6 +290,11 @@ def failures(trial: "Trial") -> list[list[str]]:
     elif late:
         rows.append([f"{count} others", "", "not reached", late[0][0].text])
     return rows
+
+
+def _margin_row(margin: "Margin") -> list[str]:
+    """One line of the table of margins."""
+    return [margin.figure, *margin.said, margin.when, margin.of]
 
 
 def _row(first: "Verdict", last: "Verdict") -> list[str]:

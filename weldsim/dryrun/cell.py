@@ -12,7 +12,7 @@ from weldsim.arm import UR5, Arm
 from weldsim.frames import Transform
 from weldsim.motion.collision import CellCollision
 from weldsim.mounts import X_WB
-from weldsim.scene.cell import BASE_GEOM, TABLE
+from weldsim.scene.cell import BASE_GEOM
 from weldsim.scene.standing import Standing
 
 if TYPE_CHECKING:
@@ -74,11 +74,8 @@ class Cell:
             return self._standing.fault(move)
         if points_B is None:
             return None
-        places = points_B[:, :2] + move[:2]
-        if not ((places >= TABLE[0]) & (places <= TABLE[1])).all():
-            return "the seam lies beside the table"
-        base = float(self.model.geom(BASE_GEOM).size[0])
-        return "the seam lies over the arm's base" if np.linalg.norm(places, axis=1).min() < base else None
+        aside = np.linalg.norm(points_B[:, :2] + move[:2], axis=1)
+        return "the seam lies over the arm's base" if aside.min() < float(self.model.geom(BASE_GEOM).size[0]) else None
 
     def clear_place(self, move: Float[ndarray, "3"]) -> Float[ndarray, "2"] | None:
         """The nearest move to one that is not possible [m]; None where there is none, or no part."""

@@ -11,24 +11,29 @@ import numpy as np
 from numpy import ndarray
 
 from weldsim import units
+from weldsim.dryrun.margin import Margin
+from weldsim.dryrun.margins import joint_speeds
 from weldsim.dryrun.verdict import DryRun, Fix, Trial, Verdict, runs
-from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
+from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, SPEED_LIMIT
 from weldsim.output import write_whole
 from weldsim.report.html import DRAW, POLICY, STYLE
-from weldsim.report.style import GRID, INK, JOINTS
+from weldsim.report.style import BAD, GRID, INK, JOINTS
 
 SAMPLES = 3000  # drawn of one line
 ROWS = 200  # of the table of waypoints
 
 
-def write_page(path: Path | str, result: DryRun, pictures: tuple[bytes | None, ...] = ()) -> Path:
+def write_page(
+    path: Path | str, result: DryRun, pictures: tuple[bytes | None, ...] = (), *, speed_limit: float = SPEED_LIMIT
+) -> Path:
     """The page written, about 5 MB of it plotly.js. Raises OutputError.
 
     Args:
         pictures: a PNG for each trial, None where there is none.
+        speed_limit: of the joints [rad/s], as the motion was planned with.
     """
     drawn: list[dict[str, Any]] = []
-    word, look = ("PASSED", "good") if result.passed else ("WOULD FAIL", "bad")
+    word, look = ("WOULD PASS", "good") if result.passed else ("WOULD FAIL", "bad")
     facts = f"in the cell {result.cell}; cycle time {result.cycle:.1f} s" if result.passed else f"in the cell {result.cell}"
     body = [
         f"<header><div><h1>Dry run of {escape(result.source)}</h1><p>{escape(facts)}</p></div>"
@@ -36,14 +41,14 @@ def write_page(path: Path | str, result: DryRun, pictures: tuple[bytes | None, .
     ]
     body += [f"<p>{escape(note)}</p>" for note in result.notes]
     for trial, fixes, png in zip(result.trials, result.fixes, pictures or (None,) * len(result.trials), strict=True):
-        body.append(_trial(trial, fixes, png, drawn))
+        body.append(_trial(trial, fixes, png, drawn, speed_limit))
     return write_whole(path, _page(f"dry run of {result.source}", "".join(body), drawn))
 
 
-def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[dict[str, Any]]) -> str:
+def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[dict[str, Any]], speed_limit: float) -> str:
     failure = trial.failure
     said = f"{units.to_mm(trial.length):.0f} mm long, {len(trial.verdicts)} waypoints"
-    parts = [f"<section><h2>{escape(trial.name)}: {'passed' if failure is None else 'would fail'}</h2><p>{escape(said)}</p>"]
+    parts = [f"<section><h2>{escape(trial.name)}: {'would pass' if failure is None else 'would fail'}</h2><p>{escape(said)}</p>"]
     if failure is not None:
         parts.append(f'<ul class="reasons"><li>{escape(place(failure))}: {escape(failure.why)}: {escape(failure.text)}</li></ul>')
         listed = "".join(
@@ -56,14 +61,26 @@ def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[
         image = base64.b64encode(png).decode()
         title = "First failure" if failure is not None else "Halfway"
         parts.append(f'<section><h2>{title}</h2><img style="max-width:100%" src="data:image/png;base64,{image}"></section>')
+    if trial.margins:
+        parts.append(f"<section><h2>Clearance and margins</h2>{_margins(trial.margins)}</section>")
     parts.append(f"<section><h2>Waypoints</h2>{_waypoints(trial)}</section>")
     if len(trial.q) > 1:
         plots = [("Joint angles", trial.t, np.rad2deg(trial.q), "joint angle [deg]", np.rad2deg(JOINT_LIMIT))]
-        speed = np.diff(trial.q, axis=0) / np.maximum(np.diff(trial.t), 1e-9)[:, None]
-        plots.append(("Joint speeds", trial.t[1:], np.rad2deg(speed), "joint speed [deg/s]", 180.0))
+        plots.append(("Joint speeds", trial.t[1:], np.rad2deg(joint_speeds(trial)), "joint speed [deg/s]", np.rad2deg(speed_limit)))
         sections = "".join(_plot(drawn, *plot, trial) for plot in plots)
         parts.append(f'<div class="two">{sections}</div>')
     return "".join(parts)
+
+
+def _margins(found: tuple[Margin, ...]) -> str:
+    """The table of what the motion has to spare."""
+    rows = []
+    for margin in found:
+        value, limit = margin.said
+        cells = f'<td>{escape(margin.figure)}</td><td class="num">{escape(value)}</td><td class="num">{escape(limit)}</td>'
+        rows.append(f'<tr>{cells}<td class="num">{margin.when}</td><td>{escape(margin.of)}</td></tr>')
+    head = "".join(f"<th>{name}</th>" for name in ("figure", "worst", "limit", "at", "of"))
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
 def place(verdict: Verdict) -> str:
@@ -76,12 +93,21 @@ def _waypoints(trial: Trial) -> str:
     found = runs(trial.verdicts)
     for first, last in found[:ROWS]:
         span = first.label if first is last or first.index == last.index else f"{first.label} to {last.label}"
-        s = "" if first.s is None else f"{units.to_mm(first.s):.1f} mm"
+        s = _span(first.s, last.s)
         mark = '<td class="mark ok">ok</td>' if first.ok else f'<td class="mark no">{escape(first.why)}</td>'
         rows.append(f'<tr><td>{escape(span)}</td><td class="num">{s}</td>{mark}<td>{escape(first.text)}</td></tr>')
     more = f"<p>and {len(found) - ROWS} more</p>" if len(found) > ROWS else ""
     head = "<tr><th>waypoint</th><th>s</th><th>verdict</th><th>reason</th></tr>"
     return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>{more}"
+
+
+def _span(first: float | None, last: float | None) -> str:
+    """Arc lengths [m] of the first and last waypoint of a row, in words."""
+    if first is None:
+        return ""
+    if last is None or last == first:
+        return f"{units.to_mm(first):.1f} mm"
+    return f"{units.to_mm(first):.1f} to {units.to_mm(last):.1f} mm"
 
 
 def _plot(drawn: list[dict[str, Any]], title: str, t: ndarray, values: ndarray, label: str, limit: float, trial: Trial) -> str:
@@ -96,12 +122,19 @@ def _plot(drawn: list[dict[str, Any]], title: str, t: ndarray, values: ndarray, 
         "plot_bgcolor": "white",
         "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
         "xaxis": {**axis, "title": {"text": "time [s]"}},
-        "yaxis": {**axis, "title": {"text": f"{label}, limit {limit:.0f}"}},
+        "yaxis": {**axis, "title": {"text": label}, "range": [-1.12 * limit, 1.12 * limit]},
     }
+    line = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "line": {"color": BAD, "width": 1, "dash": "dot"}}
+    layout["shapes"] = [{**line, "y0": edge, "y1": edge} for edge in (-limit, limit)]
+    word = {"x": 1, "xref": "paper", "xanchor": "right", "showarrow": False, "font": {"size": 10, "color": BAD}}
+    layout["annotations"] = [
+        {**word, "y": edge, "yanchor": anchor, "text": f"limit {edge:+.0f}"}
+        for edge, anchor in ((limit, "top"), (-limit, "bottom"))
+    ]
     if trial.arc_on.any():
         on = trial.t[trial.arc_on]
         band = {"type": "rect", "xref": "x", "yref": "paper", "x0": float(on[0]), "x1": float(on[-1]), "y0": 0, "y1": 1}
-        layout["shapes"] = [{**band, "fillcolor": "rgba(228,87,46,0.07)", "line": {"width": 0}, "layer": "below"}]
+        layout["shapes"].append({**band, "fillcolor": "rgba(228,87,46,0.07)", "line": {"width": 0}, "layer": "below"})
     data = [
         {
             "type": "scatter",

@@ -1,9 +1,11 @@
 """A whole dry run: every path or motion of a program tried in a cell, and fixes looked for where one fails."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
+from weldsim.dryrun.margins import margins
 from weldsim.dryrun.program import Program
 from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import DryRun
@@ -37,6 +39,6 @@ def dry_run(
         followed, trial = try_waypoints(path, name, cell, config)
         trials.append(trial)
         fixes.append(fixes_for_path(followed, trial, cell, config, lambda done: tell("fixes", done)) if fix else ())
-    return DryRun(
-        source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=(*program.notes, *cell.notes)
-    )
+    trials = [replace(trial, margins=margins(trial, cell, config)) for trial in trials]
+    notes = (*program.notes, *cell.notes)
+    return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=notes)

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.dryrun.margin import Margin, margin_json
 from weldsim.records import JointTrajectory
 
 Why = Literal[
@@ -86,6 +87,7 @@ class Trial:
         trajectory: the planned motion in full, None where there is none or the program is the robot's own.
         lead: whether it fails before the weld's first pose or after its last one: on a lead or in the air.
         split: where cutting the weld would help [m].  slowest: least ratio of possible to asked speed, 0 where it is not known.
+        margins: how far a motion that would pass is from failing.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Trial:
     lead: bool = False
     split: tuple[float, ...] = ()
     slowest: float = 0.0
+    margins: tuple[Margin, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -185,6 +188,7 @@ def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
             }
             for fix in fixes
         ],
+        "margins": [margin_json(margin) for margin in trial.margins],
         "notes": list(trial.notes),
     }
 

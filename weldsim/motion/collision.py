@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -87,8 +88,34 @@ class CellCollision:
         first, second = data.contact.geom.T
         return min(NEAR, float(np.where(self._telling[first, second], data.contact.dist, NEAR).min()))
 
+    def nearest(self, q: Float[ndarray, "6"]) -> tuple[float, str, str]:
+        """Distance [m] of the arm at q [rad] from the nearest other body or far link, and the names of the two; NEAR and no names
+        where nothing is as near as that."""
+        model, data = self._widest
+        data.qpos[self._qpos] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        if data.ncon == 0:
+            return NEAR, "", ""
+        pairs = data.contact.geom
+        gaps = np.where(self._telling[pairs[:, 0], pairs[:, 1]], data.contact.dist, NEAR)
+        least = int(gaps.argmin())
+        if gaps[least] >= NEAR:
+            return NEAR, "", ""
+        first, second = (_said(model.geom(int(g)).name) or f"geom {g}" for g in pairs[least])
+        return float(gaps[least]), first, second
+
+    @cached_property
+    def _widest(self) -> tuple[Any, Any]:
+        """The model as it is now, its margins NEAR for a pair, and its state. Bodies farther apart than their own margins are not
+        looked at, so these are set too."""
+        model = copy.copy(self._model)
+        model.geom_margin[:] = model.body_margin[:] = NEAR / 2
+        return model, mujoco.MjData(model)
+
     def shift(self, body: str, position: Float[ndarray, "3"], quaternion: Float[ndarray, "4"]) -> None:
         """Put a fixed body elsewhere in its parent [m], wxyz: `fixture` carries the part and what holds it."""
+        self.__dict__.pop("_widest", None)
         for model in (self._model, self._wide):
             index = model.body(body).id
             model.body_pos[index], model.body_quat[index] = position, quaternion

@@ -17,7 +17,8 @@ from weldsim.records import CameraIntrinsics
 from weldsim.scene.config import SceneConfig, make_workpiece, part_pose
 from weldsim.scene.files import asset_path
 from weldsim.scene.quiet import keep_quiet
-from weldsim.scene.world import HOME, compose
+from weldsim.scene.standing import Standing
+from weldsim.scene.world import HOME, check_standing, compose
 
 MARK = "ABOUT.txt"  # a folder with it is an earlier export
 
@@ -34,7 +35,7 @@ def plain_scene(config: SceneConfig, folder: str, intrinsics: CameraIntrinsics =
     """The scene as text and files; `folder` is where the text will look for the files.
 
     Raises:
-        SceneError: a scene that contradicts itself.
+        SceneError: a scene that contradicts itself, or a part that cannot stand where it is.
     """
     keep_quiet()
     workpiece = make_workpiece(config)
@@ -57,7 +58,7 @@ def plain_scene(config: SceneConfig, folder: str, intrinsics: CameraIntrinsics =
     spec.meshdir = spec.texturedir = folder
     spec.modelfiledir = ""
     spec.assets = {f"{folder}/{name}": content for name, content in files.items()}
-    spec.compile()
+    check_standing(config, Standing(model=spec.compile()))
     return PlainScene(xml=spec.to_xml(), files=files)
 
 

@@ -157,11 +157,9 @@ class Standing:
                 over = np.where(self._fits | (middle < TABLE[0]) | (middle > TABLE[1]), over, 0.0)
             row, column = np.unravel_index(over.argmax(), over.shape)
             if over[row, column] > worst[0]:
+                far = float(over[row, column])
                 edge = f"{'xy'[column]} = {1e3 * TABLE[row, column]:.0f} mm"
-                worst = (
-                    float(over[row, column]),
-                    f"{name} stands {1e3 * over[row, column]:.0f} mm beyond the table's edge at {edge}",
-                )
+                worst = (far, f"{name} stands {1e3 * far:.0f} mm beyond the table's edge at {edge}")
         return worst[1] or None
 
     def _onto_table(self, move: Float[ndarray, "3"]) -> Float[ndarray, "2"]:

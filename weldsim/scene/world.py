@@ -150,7 +150,7 @@ def build_world(
     X_BP = part_pose(config.pose, workpiece)
     model = compose(config, workpiece, X_BP, intrinsics, twin).compile()
     standing = Standing(model=model)
-    _check_standing(config, standing)
+    check_standing(config, standing)
     joints = [model.joint(name) for name in JOINT_NAMES]
     return World(
         config=config,
@@ -170,7 +170,7 @@ def build_world(
     )
 
 
-def _check_standing(config: SceneConfig, standing: Standing) -> None:
+def check_standing(config: SceneConfig, standing: Standing) -> None:
     """Raises SceneError where part or fixture cannot stand, with the nearest place where they can."""
     if (fault := standing.fault()) is None:
         return

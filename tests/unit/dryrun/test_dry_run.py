@@ -248,7 +248,7 @@ def test_the_command_exits_0_1_and_2(tmp_path, capsys) -> None:
     page, out = tmp_path / "page.html", tmp_path / "out.json"
     assert main(["dry-run", str(good), "--out", str(out), "--html", str(page)]) == 0
     assert json.loads(out.read_text())["passed"]
-    assert "PASSED" in page.read_text()
+    assert "WOULD PASS" in page.read_text()
     assert main(["dry-run", str(bad), "--no-fix", "--json"]) == 1
     lines = capsys.readouterr().out
     assert json.loads(lines[lines.index("{\n") :])["trials"][0]["first_failure"]["verdict"] == "unreachable"

@@ -15,13 +15,16 @@ from weldsim.dryrun.run import dry_run
 from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.verdict import dry_run_json
 from weldsim.errors import MotionError
-from weldsim.kinematics import torch_pose
+from weldsim.frames import Transform
+from weldsim.kinematics import inverse, torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import plan_motion
 from weldsim.motion.rail import make_rail
 from weldsim.motion.rungs import make_rungs
+from weldsim.mounts import X_FT
 from weldsim.records import TorchPath
 from weldsim.scene.config import PartPoseConfig, SceneConfig
+from weldsim.scene.world import HOME
 
 CONFIG = MotionConfig()
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -81,8 +84,11 @@ def test_a_sweep_that_something_forbids_is_a_collision_with_it() -> None:
 
 
 def test_a_part_that_stands_in_the_arm_is_named_and_moved_away() -> None:
-    cell = scene_cell(SceneConfig(pose=PartPoseConfig(x=0.039, y=-0.256)))
-    path = torch_path(flat_curve("line", 0.04) + np.array([0.039, -0.256, 0.024]), DOWN)
+    # The arm is left with its wire 2 mm over the table, amid the part: the nozzle stands in it.
+    low = Transform("BT", np.diag([1.0, -1.0, -1.0]), np.array([0.0, -0.45, 0.002])) @ X_FT.inverse()
+    waiting = min(inverse(low), key=lambda q: np.abs(q - HOME).max())
+    cell = scene_cell(SceneConfig(pose=PartPoseConfig(y=-0.45)), waiting)
+    path = torch_path(flat_curve("line", 0.04) + np.array([0.0, -0.45, 0.024]), DOWN)
     result = dry_run(program(path), cell, CONFIG)
     failure = result.trials[0].failure
     assert failure is not None

@@ -78,7 +78,9 @@ def test_without_a_part_the_seam_stands_for_it() -> None:
     points = ABOVE.X_BT.p
     assert cell.misplaced(np.zeros(3), points) is None
     assert cell.misplaced(np.array([0.0, 0.45, 0.0]), points) == "the seam lies over the arm's base"
-    assert cell.misplaced(np.array([0.7, 0.0, 0.0]), points) == "the seam lies beside the table"
+    found = reach_map(ABOVE, cell, MotionConfig(), pitch=0.45)
+    assert not found.tried[np.abs(found.y).argmin(), np.abs(found.x).argmin()]
+    assert found.tried.sum() == found.tried.size - 1
 
 
 def test_a_fix_is_no_place_where_the_part_cannot_stand() -> None:

@@ -61,7 +61,7 @@ def test_the_same_part_gets_the_same_views():
 
 def test_what_the_arm_cannot_reach_is_refused():
     with pytest.raises(UnreachableError, match=r"cannot be seen, most of it on the part's \+z side .* out of the arm's reach"):
-        plan_views(world_of("straight", x=0.9, y=-0.9))
+        plan_views(world_of("straight", x=0.45, y=-0.6, clearance=0.7))
 
 
 def test_a_range_in_which_nothing_is_seen_is_refused():

@@ -219,7 +219,9 @@ def test_bad_scenes_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="red"):
         build_world(SceneConfig(material=MaterialConfig(red=200.0)))
     with pytest.raises(UnreachableError, match="scan view 0"):
-        build_world(SceneConfig(pose=PartPoseConfig(y=-1.4))).view_joints()
+        build_world(SceneConfig(views=(ViewConfig(standoff=1.2),))).view_joints()
+    with pytest.raises(SceneError, match="beyond the table's edge"):
+        build_world(SceneConfig(pose=PartPoseConfig(y=-1.4)))
 
 
 def test_user_scene_file_is_found(tmp_path: Path) -> None:
