@@ -347,7 +347,7 @@ def _longest_path(part: Bool[ndarray, "h w"], depth: Float[ndarray, "h w"]) -> t
     n = len(rows)
     # Both ways of every step, built once: an undirected search would turn the graph over at every call.
     both_ways = coo_matrix((np.tile(np.arange(1, len(d) + 1), 2), (np.append(i, j), np.append(j, i))), (n, n)).tocsr()
-    step = both_ways.data - 1
+    step = np.asarray(both_ways.data, dtype=np.int64) - 1
     plain = csr_matrix((d[step], both_ways.indices, both_ways.indptr), (n, n))
     first = int(np.argmax(_finite(dijkstra(plain, indices=0))))
     second = int(np.argmax(_finite(dijkstra(plain, indices=first))))
