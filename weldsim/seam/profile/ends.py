@@ -13,6 +13,7 @@ NEAR = 0.014  # [m] beyond the lips' surroundings, over which the plate's edge i
 SHORTEST_GAP = 0.005  # [m] a shorter stretch unseen is not worth a word
 ONE_SIDED = 0.003  # [m] a groove is followed past the plate on one side where no edge of it is seen
 PAST_EDGE = 0.002  # [m] and past an edge that is
+FEWEST_COLUMNS = 3  # of a side's cells that show where its plate ends
 ASLANT = 0.3  # slope of an edge across the groove, read on one side of it alone
 RUN_OUT = 0.010  # [m] the most an end is carried past the last station whose depth can be trusted
 
@@ -75,16 +76,27 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     # Nothing is known beyond the rail's own end.
     limit = min(here + 0.044, (len(fit.rail) - 1) * fit.rail.step) if way > 0 else max(here - 0.044, 0.0)
     goes_on = (limit - edge) * way < 1.5 * CELL
-    sides = [side for side in (across > 0, across < 0) if side.sum() >= 3 and goes_on[side].mean() <= 0.3]
-    if not sides:
+    left, right = across > 0, across < 0
+    if goes_on.mean() > 0.3 and not (_held(left, goes_on) and _held(right, goes_on)):
+        # The plate on one side goes on, or the edge is so far aslant that it leaves what is known.
+        ended = [side for side in (left, right) if (side & ~goes_on).sum() >= FEWEST_COLUMNS and goes_on[side].mean() <= 0.3]
+        return _one_edge(across[ended[0]], edge[ended[0]]) if len(ended) == 1 and goes_on[~ended[0]].mean() > 0.7 else None
+    across, edge = across[~goes_on], edge[~goes_on]
+    if len(across) < 2 * FEWEST_COLUMNS:
         return None
-    if len(sides) == 1:
-        other = goes_on[~sides[0]]
-        return _one_edge(across[sides[0]], edge[sides[0]]) if len(other) and other.mean() > 0.7 else None
     slope, level = _median_line(across, edge)
     off = np.abs(edge - level - slope * across)
     keep = off <= max(2.5 * float(np.median(off)), 0.0015)
-    return float(np.polyval(np.polyfit(across[keep], edge[keep], 1), 0.0)) if keep.sum() >= 6 else None
+    if keep.sum() < 2 * FEWEST_COLUMNS:
+        return None
+    slope, level = np.polyfit(across[keep], edge[keep], 1).tolist()
+    # A cell aslant across the edge reaches past it: its column ends where its farther corner does.
+    return level - way * abs(slope) * CELL / 2
+
+
+def _held(side: Bool[ndarray, "k"], goes_on: Bool[ndarray, "k"]) -> bool:
+    """Whether the edge shows in enough columns of a side to be drawn through."""
+    return bool((side & ~goes_on).sum() >= FEWEST_COLUMNS)
 
 
 def _one_edge(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> float:

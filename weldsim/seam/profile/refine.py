@@ -22,6 +22,7 @@ from weldsim.seam.profile.views import Blocks, agree
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
 LOOK_AHEAD = 0.040  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it
+END_VIEW = 0.035  # [m] beyond its ends that are measured at last: a plate's edge aslant across the groove shows on both sides
 MOST_LOOKS = 3
 BLOCK = 8  # stations averaged together for the cross-section fit
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
@@ -146,7 +147,14 @@ def _settled(
         measured = farther
     if measured is None:
         return None
-    measured = _measure(_next_rail(measured, bridge), measured.section, points, origins, config, "settled") or measured
+    for _ in range(MOST_LOOKS):
+        settled = _measure(_next_rail(measured, bridge, END_VIEW), measured.section, points, origins, config, "settled")
+        if settled is None:
+            break
+        measured = settled
+        core = pieces(measured.track.weight > 0, measured.rail.step, bridge)[0]
+        if min(core.start, len(measured.rail) - core.stop) * measured.rail.step > 0.3 * END_VIEW:
+            break
     return _concluded(measured, bridge)
 
 
