@@ -7,6 +7,7 @@ to other places of the same chart, give the spread of such fits where there is n
 line. The candidate's mean amplitude is compared with what that background makes of a line as long.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from numpy import ndarray
 from weldsim.seam.profile.chart import Chart
 from weldsim.seam.profile.ends import trusted
 from weldsim.seam.profile.refine import Fit
+from weldsim.seam.profile.valley import MODE_REACH, local_slope
 
 BLOCK = 0.008  # [m] along the line: about the shortest length over which a depth camera's error is alike
 ALONG = 4  # samples along a block
@@ -135,7 +137,7 @@ def _own(fit: Fit, blocks: _Blocks, chart: Chart) -> tuple[Float[ndarray, "m"], 
 def _compared(blocks: _Blocks, grooves: Sequence[Float[ndarray, "_ 3"]], chart: Chart, own: Float[ndarray, "k"]) -> Standing:
     """The candidate's amplitudes against those elsewhere in a chart, off all `grooves` [m]."""
     cells = _cells(chart, blocks.points)
-    free = chart.valid.copy()
+    free = chart.valid & _own_surface(cells, chart)
     row, column = _cells(chart, np.concatenate(grooves)).T
     inside = (row >= 0) & (column >= 0) & (row < free.shape[0]) & (column < free.shape[1])
     free[row[inside], column[inside]] = False
@@ -149,6 +151,20 @@ def _compared(blocks: _Blocks, grooves: Sequence[Float[ndarray, "_ 3"]], chart: 
         alike, number = _alike(placed / max(spread, 1e-9), len(own)), int(np.isfinite(placed).sum())
     looks = len(own) / alike
     return Standing(float(own.mean()) / max(spread, 1e-6) * float(np.sqrt(looks)), looks, spread, alike, number)
+
+
+def _own_surface(cells: Int[ndarray, "m a w 2"], chart: Chart) -> Bool[ndarray, "r c"]:
+    """Cells that lie as the candidate's surface does: a table behind a tilted part has another noise."""
+    slope = local_slope(chart)
+    h, w = chart.valid.shape
+    row, column = np.clip(cells[..., 0], 0, h - 1), np.clip(cells[..., 1], 0, w - 1)
+    here = slope[row, column].reshape(len(cells), -1, 2)
+    here = np.where(np.isfinite(here), here, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a block without any
+        usual = np.nanmedian(here, axis=1)
+    low, high = np.nanmin(usual, axis=0) - MODE_REACH, np.nanmax(usual, axis=0) + MODE_REACH
+    return np.asarray(((slope > low) & (slope < high)).all(axis=-1))
 
 
 def _spread(placed: Float[ndarray, "q m"]) -> float | None:

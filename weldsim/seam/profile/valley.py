@@ -56,7 +56,7 @@ def valley_images(chart: Chart, config: ProfileConfig, factor: float = 1.0) -> l
     A groove on a part tilted far from the table has no lowest line as the table sees it; so heights are taken off the
     part's own slope, and the part's own background sets the threshold, times `factor`.
     """
-    slope = _local_slope(chart)
+    slope = local_slope(chart)
     images = []
     for mode in _slope_modes(slope.reshape(-1, 2)[np.flatnonzero(chart.valid)[::3]]):
         within = chart.valid & _alike(slope, mode)
@@ -131,7 +131,7 @@ def _without_spikes(height: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"]) 
     return np.where(valid & (np.abs(height - median) > 0.003) & (median > -0.5 * FAR), median, height)
 
 
-def _local_slope(chart: Chart) -> Float[ndarray, "h w 2"]:
+def local_slope(chart: Chart) -> Float[ndarray, "h w 2"]:
     """Slope of the chart at each cell along rows and columns [1], over about 10 mm; infinite where not measured."""
     h, w = chart.valid.shape
     reach = max(1, min(round(0.005 / chart.pitch), h // 4, w // 4))
