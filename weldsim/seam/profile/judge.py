@@ -13,9 +13,9 @@ MISFIT_LIMIT = 0.75
 MIN_SUPPORT = 0.5
 MOST_LAPSES = 0.18
 LOOKS = 1.5  # looks at the depth, that a groove is longer than: a hole is drawn out to one
-FOUND = 6.0  # score of a `Standing`, from which on it is a groove; waves of simulated bare tables reach 3
+FOUND = 5.0  # score of a `Standing`, from which on it is a groove; waves of bare tables, real and simulated, reach 3.5
 CLEAR = 6.0  # score at which 37 % of the doubt is left
-DOUBTFUL = 3.0  # from which on it is named as one that there may be
+DOUBTFUL = 3.5  # from which on it is named as one that there may be
 
 
 def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: bool = False) -> str | None:
