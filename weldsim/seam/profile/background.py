@@ -29,7 +29,11 @@ NEAR = 0.10  # [m] either way: where the viewpoint is unknown or wrong, noise di
 MOST_BLOCKS = 40  # of a longer line the middle is compared
 FEWEST = 24  # placed blocks that tell a spread
 WAVES = 0.003  # [m] rms about a smooth surface, from which on a place is an edge or an object
+ODD, LEAST_WAVES = 2.5, 2e-4  # times the usual rms, and more than that [m], from which on it is one too
 CORE_HELD, SIDE_HELD = 0.7, 0.5  # of a block's samples, in the section and on either side, must have data
+BLUNTED = 1.4  # variance of an amplitude, over that of one from a whole block, from which on missing samples spoil it
+SHOULDER = 0.003  # [m] beyond the blurred lips of a groove that is no background either
+LARGEST = 2.0  # amplitude at which one of the candidate's blocks counts as no more: a hole is no long groove
 SHOWN = 0.5  # of the candidate's own blocks a chart must hold to speak of it
 LAGS = 12  # blocks over which correlation along the line is followed
 LEAST_CORRELATION = 0.05  # under which the rest is taken as independent
@@ -77,14 +81,14 @@ def standing(
         own, facing = _own(fit, blocks, chart)
         shown = float(np.isfinite(own).mean()) * facing
         if np.isfinite(own).mean() >= SHOWN and np.isfinite(own).sum() >= 2 and shown > best_shown:
-            best, best_shown = (chart, own[np.isfinite(own)]), shown
+            best, best_shown = (chart, np.clip(own[np.isfinite(own)], -LARGEST, LARGEST)), shown
     return None if best is None else _compared(blocks, (lips(fit, span), *others), *best)
 
 
 def lips(fit: Fit, span: tuple[float, float]) -> Float[ndarray, "j 3"]:
     """Places on the surface that a groove, as a camera blurs it, may reach [m], a millimetre apart."""
     stations = np.flatnonzero(trusted(fit, span))
-    reach = 0.5 * (fit.section.width + fit.section.blur)
+    reach = 0.5 * (fit.section.width + fit.section.blur) + SHOULDER
     x = np.arange(-reach, reach + 5e-4, 1e-3)
     return (fit.rail.points[stations][:, None] + x[:, None] * fit.rail.e[stations][:, None]).reshape(-1, 3)
 
@@ -142,7 +146,9 @@ def _compared(blocks: _Blocks, grooves: Sequence[Float[ndarray, "_ 3"]], chart: 
     inside = (row >= 0) & (column >= 0) & (row < free.shape[0]) & (column < free.shape[1])
     free[row[inside], column[inside]] = False
     amplitude, rough = _amplitudes(blocks, cells, _shifts(cells, chart), free, chart.height)
-    placed = np.where(rough < WAVES, amplitude, np.nan)
+    held = rough[np.isfinite(amplitude)]
+    usual = ODD * float(np.median(held)) + LEAST_WAVES if len(held) else WAVES
+    placed = np.where(rough < min(usual, WAVES), amplitude, np.nan)
     spreads = [_spread(part) for part in (placed[:SHIFTS], placed[SHIFTS:])]
     spread = max((each for each in spreads if each is not None), default=None)
     if spread is None:
@@ -217,9 +223,10 @@ def _amplitudes(
         u = x / np.abs(x).max()
         design = np.stack([-blocks.section, np.ones_like(u), u, u**2], axis=1)
         gram = np.einsum("kx,xi,xj->kij", weight, design, design, optimize=True)
-        gram += 1e-12 * np.eye(4)
-        theta = np.linalg.solve(gram, ((weight * depth) @ design)[..., None])[..., 0]
-        amplitude[enough] = theta[:, 0]
+        inverse = np.linalg.inv(gram + 1e-12 * np.eye(4))
+        theta = np.einsum("kij,kj->ki", inverse, (weight * depth) @ design)
+        whole = np.linalg.inv(design.T @ design + 1e-12 * np.eye(4))[0, 0]
+        amplitude[enough] = np.where(inverse[:, 0, 0] < BLUNTED * whole, theta[:, 0], np.nan)
         left = weight * (depth - theta @ design.T) ** 2
         rough[enough] = np.sqrt(left.sum(axis=1) / weight.sum(axis=1))
     return amplitude, rough

@@ -23,7 +23,7 @@ from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.grow import grow, uncovered
 from weldsim.seam.profile.join import Piece, gaps, join_pieces
-from weldsim.seam.profile.judge import DOUBTFUL, confidence, doubt, refusal, score
+from weldsim.seam.profile.judge import confidence, doubt, refusal
 from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit
 from weldsim.seam.profile.track import deepest
@@ -31,6 +31,7 @@ from weldsim.seam.profile.valley import CoarseLine
 from weldsim.seam.profile.window import at_one_window
 
 LONG = 0.05  # [m] a seam of this length is half as good as the same one without end
+LIKELY = 3.0  # times over the background, from which on a candidate is left out of that of others: it may be a groove
 MIN_LEVEL = 0.5  # of a coarse line must have surface at one level on both sides
 MOST_REMAINDERS = 3  # times what is left of a coarse line is tried again
 
@@ -124,7 +125,11 @@ def _standings(pieces: list[Piece], atlas: Atlas) -> dict[int, Standing]:
         return standing(piece.fit, piece.span, charts, others)
 
     alone = [measured(piece, []) for piece in pieces]
-    likely = {id(piece): lips(piece.fit, piece.span) for piece, each in zip(pieces, alone, strict=True) if score([each]) > DOUBTFUL}
+    likely = {
+        id(piece): lips(piece.fit, piece.span)
+        for piece, each in zip(pieces, alone, strict=True)
+        if each is not None and each.ratio > LIKELY
+    }
     found = {}
     for piece, each in zip(pieces, alone, strict=True):
         others = [places for key, places in likely.items() if key != id(piece)]
