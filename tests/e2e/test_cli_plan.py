@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -165,14 +166,18 @@ def test_a_report_is_a_page_a_picture_or_a_folder_of_both(weldsim, scan, tmp_pat
     assert "greatest movement of the centre line" in page  # how stable the answer is about the threshold
     assert "<script src" not in page
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]  # and no file that nobody asked for
-    assert "stability" in done.stdout  # the time that the report takes is told
-    assert ", report " in done.stdout.partition("seconds:")[2]
+    assert "seed" not in re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)  # a file of one's own has none
+    # What the report took is told, and whose doing it is.
+    assert re.search(r"seconds: .* stability [\d.]+, report [\d.]+;", done.stdout)
+    assert re.search(r"stability, for the report alone: the seams found twice more, [\d.]+ s", done.stdout)
+    assert "stability" not in weldsim("plan", scan / "cloud.ply", "--set", "cloud.voxel=1.2 mm").stdout
     done = weldsim("plan", scan / "cloud.ply", "--report", "report.png", "--set", "cloud.voxel=1.2 mm")
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "report.png").read_bytes().startswith(b"\x89PNG")
     done = weldsim("plan", scan / "plain.ply", "--report", "folder/", "--set", "cloud.voxel=1.2 mm")
     assert done.returncode == 1
     assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == ["report.html", "report.png"]
+    assert (tmp_path / "folder" / "report.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_page_is_written_where_its_picture_could_not_be(weldsim, scan, tmp_path):

@@ -84,7 +84,8 @@ class WeldReport:
         seam: number of the seam that the figures are of, from 1.  welded, seams: how many were welded, of how many there are.
         others: the same of the other seams of the job, without what is said of all of them together.
         stopped: why the arm was stopped before the end, or None.  progress: how far it came.  way_on: how to go on, in words.
-        timing: seconds a stage.  seed, config_digest, versions: what it ran with.
+        timing: seconds a stage.  seed, config_digest, versions: what it ran with; the seed of the twin's cameras, None for
+            what no twin has seen.
     """
 
     passed: bool
@@ -115,6 +116,6 @@ class WeldReport:
     progress: WeldProgress | None = None
     way_on: str = ""
     timing: dict[str, float] = field(default_factory=dict)
-    seed: int = 0
+    seed: int | None = None
     config_digest: str = ""
     versions: dict[str, str] = field(default_factory=dict)

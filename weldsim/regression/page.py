@@ -16,7 +16,12 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 MORE = """
 .worse{color:var(--bad);font-weight:600}.ok{color:var(--good)}.new{color:var(--soft)}
 figure{margin:0}img{width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px;margin:6px 0 0}
-td,th{white-space:nowrap}td.why{white-space:normal;color:var(--soft)}
+main{max-width:1600px}
+table{font-size:13px}th{font-size:12px;vertical-align:bottom}
+td,th{padding-right:6px;overflow-wrap:normal}td.num,td.worse{white-space:nowrap}td.name{min-width:7.5em;overflow-wrap:anywhere}
+.seeds table{font-size:12px}.seeds th{font-size:11px}
+@media(max-width:1100px){.seeds table,.seeds th{font-size:10px}.seeds th{overflow-wrap:anywhere}.seeds td.name{min-width:4em}}
+td.why{color:var(--soft);padding-left:16px;border-top:0}
 """
 
 
@@ -82,15 +87,25 @@ def _figure(row: Row) -> str:
 def _seeds(outcome: Regression) -> str:
     """Every row, every figure."""
     names = [name for name in FIGURES if any(name in row.figures.judged() for row in outcome.rows)]
-    head = "".join(f"<th>{escape(text)}</th>" for text in ("scene", "method", "seed", *(FIGURES[name].label for name in names), ""))
+    head = "".join(f"<th>{escape(text)}</th>" for text in ("scene", "method", "seed", *map(_labelled, names)))
     rows = []
     for row in outcome.rows:
         figures, worse = row.figures.judged(), {deviation.figure for deviation in row.deviations}
         cells = "".join(
             f'<td class="{"worse" if name in worse else "num"}">{escape(text)}</td>'
-            for name, text in ((name, number(name, figures[name]) if name in figures else "") for name in names)
+            for name, text in ((name, number(name, figures[name], unit=False) if name in figures else "") for name in names)
         )
-        start = f"<td>{escape(row.figures.scene)}</td><td>{escape(row.figures.method)}</td><td>{row.figures.seed}</td>"
-        why = " ".join(filter(None, (row.figures.refused, f"run directory {row.folder}" if row.folder else "")))
-        rows.append(f'<tr>{start}{cells}<td class="why">{escape(why)}</td></tr>')
-    return f"<section><h2>Every seed</h2><table><tr>{head}</tr>{''.join(rows)}</table></section>"
+        scene = f'<td class="name">{escape(row.figures.scene)}</td>'
+        start = f"{scene}<td>{escape(row.figures.method)}</td><td>{row.figures.seed}</td>"
+        rows.append(f"<tr>{start}{cells}</tr>")
+        why = "; ".join(filter(None, (row.figures.refused, f"run directory {row.folder}" if row.folder else "")))
+        if why:  # in a line of its own: beside the figures there is no room
+            rows.append(f'<tr><td class="why" colspan="{3 + len(names)}">{escape(why)}</td></tr>')
+    return f'<section class="seeds"><h2>Every seed</h2><table><tr>{head}</tr>{"".join(rows)}</table></section>'
+
+
+def _labelled(name: str) -> str:
+    """A figure's name over its column, with the unit that its numbers are in."""
+    figure = FIGURES[name]
+    unit = {"length": "mm", "angle": "deg", "time": "s"}.get(figure.kind)
+    return figure.label.removesuffix(", seconds") + ("" if unit is None else f" [{unit}]")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy import ndarray
 
 from weldsim import units
+from weldsim.frames import unit
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindings, TorchPath
 from weldsim.report.limits import ReportConfig
 from weldsim.report.style import BAD, CENTRE, GRID, INK, JOINTS, KNOWN, LINES, LIPS, REGION, SEAM, SOFT, WIDTHS, WIRE
@@ -18,7 +19,9 @@ from weldsim.report.view import CrossSection, ErrorLine, height_range, heights, 
 
 Figure = dict[str, Any]
 CLOUD_LIMIT = 60_000  # points drawn
-LONGEST = 1.8  # side of the scene, in units of plotly's camera, that can be seen whole
+LONGEST = 1.0  # side of the scene, in units of plotly's camera
+SEEN = 0.82 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
+WIDER = 1.6  # how much wider than high a scene is on a narrow page
 LINE_LIMIT = 3000  # samples drawn of one line
 
 
@@ -59,7 +62,8 @@ def scene(
         data.append(_line("executed tip", _thin(log.X_BT_act.p[log.arc_on]), LINES["executed"], 3, legend=i == 0))
     if stopped_B is not None:
         data.append(_dots("stopped here", np.array([stopped_B]), {"size": 9, "color": BAD, "symbol": "x"}) | {"showlegend": True})
-    eye = 0.9 * X_BS.R[:, 2] - 0.75 * X_BS.R[:, 1]
+    box = np.concatenate([points, groove, *(torch_axes(path).reshape(-1, 3) for path in paths if path is not None)])
+    shape, eye = _fitted(box, unit(0.9 * X_BS.R[:, 2] - 0.75 * X_BS.R[:, 1]), X_BS.R[:, 2])
     axis = {"backgroundcolor": "#f7f9fa", "gridcolor": GRID, "showbackground": True, "color": SOFT, "tickfont": {"size": 10}}
     axis |= {"zeroline": False, "showspikes": False}
     layout = _layout("", "", height=620)
@@ -67,8 +71,9 @@ def scene(
     layout |= {
         "scene": {
             **{f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}} for name in "xyz"},
-            **_aspect(points, *(torch_axes(path).reshape(-1, 3) for path in paths if path is not None)),
-            "camera": {"eye": _xyz((1.25 if findings.seams else 1.4) * eye), "up": _xyz(X_BS.R[:, 2])},
+            "aspectmode": "manual",
+            "aspectratio": _xyz(shape),
+            "camera": {"eye": _xyz(eye), "up": _xyz(X_BS.R[:, 2])},
         },
         "margin": {"l": 0, "r": 0, "t": 8, "b": 0},
         "legend": {"orientation": "h", "y": 0.01, "x": 0.01, "bgcolor": "rgba(255,255,255,0.8)", "itemsizing": "constant"},
@@ -76,13 +81,20 @@ def scene(
     return {"data": data, "layout": layout}
 
 
-def _aspect(*points_B: ndarray) -> Figure:
-    """True proportions; of what is long and thin no more than fits into the view."""
-    span = np.ptp(np.concatenate(points_B), axis=0)
-    shape = span / np.cbrt(span.prod()) if span.min() > 0 else np.ones(3)  # as plotly scales "data"
-    if shape.max() <= LONGEST:
-        return {"aspectmode": "data"}
-    return {"aspectmode": "manual", "aspectratio": _xyz(shape * LONGEST / shape.max())}
+def _fitted(points_B: ndarray, towards: ndarray, up: ndarray) -> tuple[ndarray, ndarray]:
+    """Sides of the box about the points, in true proportions and plotly's units, and the nearest eye from which all of it is seen.
+
+    Args:
+        towards: direction of the eye from the middle of the box.  up: what is up in the picture.
+    """
+    span = np.maximum(np.ptp(points_B, axis=0), 1e-4)
+    shape = np.maximum(LONGEST * span / span.max(), 0.02)
+    right = unit(np.cross(up, towards))
+    axes = np.stack([right, np.cross(towards, right), towards])
+    corners = axes @ (np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * shape / 2).T
+    # A corner at height h and depth d under the eye is seen below the angle atan(h / (far - d)).
+    aside, above, depth = np.abs(corners[0]) / (WIDER * SEEN), np.abs(corners[1]) / SEEN, corners[2]
+    return shape, float((np.maximum(aside, above) + depth).max()) * towards
 
 
 def uncertainty(seam: Seam) -> Figure:

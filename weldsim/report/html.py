@@ -151,7 +151,7 @@ def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) ->
     listed = "" if report.passed else "".join(f"<li>{escape(reason)}</li>" for reason in report.reasons)
     on = (report.way_on,) if report.way_on else ()
     listed += "".join(f"<li>{escape(clause)}</li>" for clause in (*on, *report.warnings, *report.unplanned))
-    facts = f"{why}; method {report.method}, seed {report.seed}"
+    facts = f"{why}; method {report.method}" + ("" if report.seed is None else f", seed {report.seed}")
     return (
         f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"
         f'<div class="verdict {look(word)}">{escape(word)}</div></header>'

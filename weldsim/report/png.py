@@ -12,13 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy import ndarray
 
 from weldsim import units
-from weldsim.frames import Transform
 from weldsim.output import write_whole
-from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, TorchPath, WeldReport
+from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import ReportConfig
+from weldsim.report.plane import Plane, Seen, plane_of
 from weldsim.report.style import AMBER, BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
 from weldsim.report.verdict import look, stopped_place, verdict
@@ -31,7 +32,6 @@ from weldsim.report.view import (
     heights,
     shows_surface,
     torch_axes,
-    view_frame,
 )
 
 EMPTY = "#eef1f4"
@@ -59,10 +59,11 @@ def write_png(
     grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, top=0.86, bottom=0.08, width_ratios=(1.75, 1), hspace=0.34, wspace=0.16)
     _headline(figure, report, findings, config or ReportConfig())
     surface = shows_surface(cloud, findings.seams)
+    plane = plane_of(cloud, findings.seams, welded)
     plan = figure.add_subplot(grid[:, 0])
-    _plan_view(figure, plan, cloud, findings, paths, surface=surface)
+    _plan_view(figure, plan, plane, cloud, findings, paths, surface=surface)
     if (place := stopped_place(report)) is not None and report.progress is not None:
-        _stop(plan, view_frame(cloud, findings.seams).inverse(), np.array(place), report.progress.s_to)
+        _stop(plan, plane, np.array(place), report.progress.s_to)
     upper, lower = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
     if findings.seams:
         if surface:
@@ -106,50 +107,61 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
 def _plan_view(
     figure: Figure,
     axes: Axes,
+    plane: Plane,
     cloud: PointCloud,
     findings: SeamFindings,
     paths: tuple[TorchPath | None, ...],
     *,
     surface: bool,
 ) -> None:
-    """The cloud as heights over the parent surface, where it shows one, seen along its normal; lips, centre line and wires."""
-    X_BS = view_frame(cloud, findings.seams)
-    X_SB = X_BS.inverse()
-    points = X_SB.points(cloud.points)
-    window = _window(points, [X_SB.points(seam.points_B) for seam in findings.seams])
+    """The cloud as heights over the parent surface, where it shows one; lips, centre line and wires."""
+    points = plane.points(cloud.points)
+    flat = isinstance(plane, Seen)
+    window = _window(points, [plane.points(seam.points_B) for seam in findings.seams]) if flat else _strip(plane.seam)
     if surface:
         seen = ((points[:, :2] >= window[0]) & (points[:, :2] <= window[1])).all(axis=1)
-        _surface(figure, axes, points[seen], heights(cloud.points[seen], findings.seams, X_BS), findings)
+        seen &= flat | (np.abs(points[:, 2]) < LAYER)  # what an unrolled view has over itself is another face
+        above = heights(cloud.points[seen], findings.seams, plane.X_BS) if isinstance(plane, Seen) else points[seen, 2]
+        _surface(figure, axes, points[seen], above, findings)
     else:
         axes.set_anchor("N")
+    many = len(findings.seams) > 1
     for i, (seam, path) in enumerate(zip(findings.seams, paths, strict=False)):
         for k, side in enumerate(side for side in (seam.left_B, seam.right_B) if side is not None):
-            _trace(axes, X_SB, side, LIPS, 1.2, "--", "lips" if i == k == 0 else None)
+            _trace(axes, plane, side, LIPS, 1.2, "--", "lips" if i == k == 0 else None)
         if path is None:
-            _trace(axes, X_SB, seam.points_B, EMPTY, 1.6, ":", None)
-            _number(axes, X_SB, seam.points_B, f"{i + 1}: no path")
+            _trace(axes, plane, seam.points_B, EMPTY, 1.6, ":", None)
+            _number(axes, plane, seam.points_B, f"{i + 1}: no path" if many else "no path")
             continue
         # Seen along the normal a wire is a dot: its height is drawn obliquely, as in a cabinet projection.
-        ends = 1e3 * X_SB.points(torch_axes(path).reshape(-1, 3)).reshape(-1, 2, 3)
+        ends = 1e3 * plane.arrows(torch_axes(path))
         wires = ends[:, :, :2] + (ends[:, :, 2:] - ends[:, :1, 2:]) * OBLIQUE
         axes.add_collection(
             LineCollection(list(wires), colors=WIRE, linewidths=1.1, label="wire, drawn obliquely" if i == 0 else None)
         )
         axes.scatter(*wires[:, 0].T, s=9, color=WIRE, zorder=3)
-        _trace(axes, X_SB, path.X_BT.p[path.weld], SEAM, 2.4, "-", "torch path" if i == 0 else None)
+        _trace(axes, plane, path.X_BT.p[path.weld], SEAM, 2.4, "-", "torch path" if i == 0 else None)
         tip = path.X_BT.p[path.weld]
-        _ends(axes, X_SB, tip, legend=i == 0)
-        _number(axes, X_SB, tip, f"{i + 1}")
+        _ends(axes, plane, tip, legend=i == 0)
+        if many:
+            _number(axes, plane, tip, f"{i + 1}")
     axes.set_xlabel("along [mm]", color=INK)
     axes.set_ylabel("across [mm]", color=INK)
-    axes.set_aspect("equal")
+    axes.set_aspect("equal" if flat else "auto")
     axes.set_facecolor(EMPTY)
     axes.set_xlim(*(1e3 * window[:, 0]))
     axes.set_ylim(*(1e3 * window[:, 1]))
     if findings.seams:
-        axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=10)
+        # Beside the title, over the drawing: there is no corner that a part or its seam may not lie in.
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, frameon=False, fontsize=9, borderaxespad=0.1)
     _plain(axes, grid=False)
-    axes.set_title("Seen along the surface normal", loc="left", fontsize=13, color=INK)
+    enlarged = "" if flat else f", across it {RATIO * np.ptp(window[:, 0]) / np.ptp(window[:, 1]):.0f} x as large"
+    axes.set_title(plane.title + enlarged, loc="left", fontsize=13, color=INK)
+
+
+def _strip(seam: Seam) -> ndarray:
+    """Lowest and highest corner of the unrolled view [m]: the seam with a margin at its ends and sides."""
+    return np.array([[-MARGIN, -MARGIN], [seam.length + MARGIN, MARGIN]])
 
 
 def _surface(figure: Figure, axes: Axes, points: ndarray, height: ndarray, findings: SeamFindings) -> None:
@@ -174,31 +186,37 @@ def _window(points_S: ndarray, seams_S: list[ndarray]) -> ndarray:
     return np.stack([(low + high) / 2 - half, (low + high) / 2 + half])
 
 
-def _stop(axes: Axes, X_SB: Transform, place_B: ndarray, s: float) -> None:
+def _stop(axes: Axes, plane: Plane, place_B: ndarray, s: float) -> None:
     """A cross where a weld was stopped, with its arc length [m]."""
-    x, y, _ = 1e3 * X_SB.points(place_B[None])[0]
+    x, y, _ = 1e3 * plane.points(place_B[None])[0]
     axes.plot([x], [y], "x", color=BAD, ms=15, mew=4, zorder=6)
     text = f"stopped at {units.to_mm(s):.1f} mm"
     style = {"boxstyle": "round,pad=0.25", "fc": "white", "ec": BAD}
     axes.annotate(text, (x, y), xytext=(10, -26), textcoords="offset points", color=BAD, weight="bold", fontsize=12, bbox=style)
 
 
-def _number(axes: Axes, X_SB: Transform, points_B: ndarray, text: str) -> None:
-    """`text` beside the first point of a line."""
-    start = 1e3 * X_SB.points(points_B[:1])[0]
-    axes.annotate(text, start[:2], xytext=(-14, 8), textcoords="offset points", color=SEAM, weight="bold", fontsize=13)
+def _number(axes: Axes, plane: Plane, points_B: ndarray, text: str) -> None:
+    """`text` beside the middle of a line, where its wires are not: seams that meet have their ends in one place."""
+    middle = len(points_B) // 2
+    here, there = 1e3 * plane.points(points_B[[middle, min(middle + 1, len(points_B) - 1)]])[:, :2]
+    ahead = there - here
+    aside = np.array([-ahead[1], ahead[0]]) / max(float(np.hypot(*ahead)), 1e-9)
+    aside = aside if aside @ OBLIQUE < 0 else -aside
+    halo = [withStroke(linewidth=3, foreground="white")]
+    look = {"color": SEAM, "weight": "bold", "fontsize": 14, "path_effects": halo, "zorder": 7, "ha": "center", "va": "center"}
+    axes.annotate(text, here, xytext=tuple(20 * aside), textcoords="offset points", **look)
 
 
-def _ends(axes: Axes, X_SB: Transform, points_B: ndarray, *, legend: bool) -> None:
+def _ends(axes: Axes, plane: Plane, points_B: ndarray, *, legend: bool) -> None:
     """A disc where the torch starts and a square where it ends; around a ring the disc lies in the square."""
-    ends = 1e3 * X_SB.points(points_B[[0, -1]])
+    ends = 1e3 * plane.points(points_B[[0, -1]])
     for name, place, mark, size, front in (("start", ends[0], "o", 26, 6), ("end", ends[1], "s", 64, 5)):
         look = {"facecolor": "white", "edgecolor": SEAM, "linewidth": 1.6, "zorder": front}
         axes.scatter(place[0], place[1], s=size, marker=mark, label=name if legend else None, **look)
 
 
-def _trace(axes: Axes, X_SB: Transform, points_B: ndarray, colour: str, width: float, style: str, label: str | None) -> None:
-    x, y, _ = 1e3 * X_SB.points(points_B).T
+def _trace(axes: Axes, plane: Plane, points_B: ndarray, colour: str, width: float, style: str, label: str | None) -> None:
+    x, y, _ = 1e3 * plane.points(points_B).T
     axes.plot(x, y, style, color=colour, lw=width, label=label)
 
 
@@ -287,8 +305,11 @@ def _along(
                 axes.fill_between(1e3 * line.s, -2 * edge, 2 * edge, color=SEAM, alpha=0.13, lw=0, label="2 sigma, as reported")
         axes.set_title("Error across the known seam", loc="left", fontsize=13, color=INK)
         axes.set_ylabel("left of the seam [mm]")
-        reach = 1.25 * max(0.5, *(1e3 * float(np.abs(line.across).max()) for line in lines.values()))
-        axes.set_ylim(-reach, reach)
+        far = max(0.5, *(1e3 * float(np.abs(line.across).max()) for line in lines.values()))
+        band = max((2e3 * float(line.sigma.max()) for line in lines.values() if line.sigma is not None), default=0.0)
+        # The whole band, where the lines are still to be told apart beside it; and room for the legend.
+        reach = 1.15 * max(far, min(band, 6 * far))
+        axes.set_ylim(-reach, 1.3 * reach)
     elif seam.sigma is not None:
         axes.plot(s, 1e3 * seam.sigma, color=SEAM, lw=1.8, label="sigma across the seam")
         axes.set_ylim(0, 1.35e3 * float(seam.sigma.max()) + 1e-3)

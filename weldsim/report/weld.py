@@ -38,7 +38,7 @@ def weld_report(
     stopped: str | None = None,
     progress: WeldProgress | None = None,
     timing: dict[str, float] | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     config_digest: str = "",
     config: ReportConfig | None = None,
 ) -> WeldReport:
@@ -55,7 +55,7 @@ def weld_report(
         trims: length left out on purpose at the start and end of the weld [m]; it is not missed.
         unjudged: figures that nothing is known to judge by, and why.
         stopped: why the arm was stopped before the end.  progress: how far it came.
-        timing: seconds a stage.  seed, config_digest: what it ran with.
+        timing: seconds a stage.  seed, config_digest: what it ran with; seed None where no twin looked.
         config: the limits.
 
     The verdict is passed when nothing stopped the weld, every judged figure keeps its limit, no known seam is missed and, where

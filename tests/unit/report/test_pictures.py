@@ -1,20 +1,24 @@
 """Page and picture: valid figures, nothing fetched from a network, the same bytes each time, with a seam or without."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from tests.seams import findings, found_seam, plate_cloud, sine_seam, torch_path, weld_log
 from weldsim.errors import OutputError
 from weldsim.frames import Transform, matrix_from_rotation_vector
-from weldsim.records import PointCloud, Rejection, SeamFindings, Threshold
+from weldsim.records import PointCloud, Rejection, Seam, SeamFindings, Threshold
 from weldsim.report import figures
 from weldsim.report.html import write_html
 from weldsim.report.limits import ReportConfig
-from weldsim.report.png import write_png
+from weldsim.report.plane import Seen, Unrolled, plane_of
+from weldsim.report.png import _plan_view, write_png
 from weldsim.report.view import cross_section, error_lines, heights, shown, shows_surface, torch_axes, view_frame
 from weldsim.report.weld import weld_report
 
@@ -59,8 +63,7 @@ def test_a_path_file_has_no_surface_to_show(tmp_path: Path) -> None:
     assert not shows_surface(bare, (SEAM,))
     drawn = figures.scene(bare, found, (PATH,), (LOG,), ())
     assert "cloud" not in [trace["name"] for trace in drawn["data"]]
-    ratio = drawn["layout"]["scene"].get("aspectratio", {"x": 0.0})
-    assert max(ratio.values()) <= figures.LONGEST + 1e-9
+    assert max(drawn["layout"]["scene"]["aspectratio"].values()) <= figures.LONGEST + 1e-9
     text = write_html(tmp_path / "r.html", REPORT, bare, found, (PATH,), log=LOG).read_text()
     assert "<h2>Torch speed</h2>" in text
     assert "<h2>Mean cross-section</h2>" not in text
@@ -148,3 +151,80 @@ def test_torch_axes_start_at_the_tip_and_go_back_along_the_wire() -> None:
     wire = (axes[:, 0] - axes[:, 1]) / 0.03
     assert np.allclose(wire, -SEAM.normals_B[0], atol=1e-6)
     assert np.linalg.norm(axes[:, 0] - PATH.X_BT.p[0], axis=1)[0] < 1e-12
+
+
+def test_all_of_the_scene_is_in_view_with_room_for_its_labels() -> None:
+    """Corners of the drawn box as plotly's camera sees them: 45 deg high, on a page half as wide again as high."""
+    for seams in ((SEAM,), ()):
+        found = SeamFindings(seams=seams, region=np.zeros(len(CLOUD), np.int32), method="profile")
+        layout = figures.scene(CLOUD, found, (PATH,) * len(seams), (), ())["layout"]["scene"]
+        shape, eye, up = (
+            np.array([box[name] for name in "xyz"])
+            for box in (layout["aspectratio"], layout["camera"]["eye"], layout["camera"]["up"])
+        )
+        back = eye / np.linalg.norm(eye)
+        right = np.cross(up, back) / np.linalg.norm(np.cross(up, back))
+        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * shape / 2
+        ahead = (eye - corners) @ back
+        half = ahead * np.tan(np.pi / 8)
+        high, wide = np.abs(corners @ np.cross(back, right)) / half, np.abs(corners @ right) / half / figures.WIDER
+        assert ahead.min() > 0.1
+        assert 0.6 < max(high.max(), wide.max()) < 0.9
+
+
+def folded(angle: float) -> tuple[Seam, PointCloud]:
+    """A seam along x that goes over an edge bent down by `angle` [rad] at 100 mm of its 200 mm, and its two faces."""
+    s = np.linspace(0.0, 0.2, 201)
+    down = np.where(s > 0.1, angle, 0.0)
+    along = np.stack([np.cos(down), np.zeros_like(s), -np.sin(down)], axis=1)
+    normal = np.stack([np.sin(down), np.zeros_like(s), np.cos(down)], axis=1)
+    corner = np.array([0.1, 0.0, 0.0])
+    line = np.where((s > 0.1)[:, None], corner + (s - 0.1)[:, None] * along, s[:, None] * along)
+    across = np.array([0.0, 1.0, 0.0])
+    faces = np.concatenate([line + y * across for y in np.linspace(-0.03, 0.03, 61)])
+    seam = Seam(points_B=line, s=s, tangents_B=along, normals_B=normal, left_B=line + 0.005 * across, right_B=line - 0.005 * across)
+    return seam, PointCloud(points=faces, frame="B")
+
+
+def test_a_seam_over_edges_is_unrolled_and_no_other() -> None:
+    seam, cloud = folded(np.pi / 2 * 1.2)
+    plane = plane_of(cloud, (seam,))
+    assert isinstance(plane, Unrolled)
+    flat = plane.points(cloud.points)
+    y, s = np.repeat(np.linspace(-0.03, 0.03, 61), 201), np.tile(seam.s, 61)
+    clear = np.abs(s - 0.1) > 0.035  # beside the edge a point may be nearest to the other face
+    assert np.abs(flat - np.stack([s, y, np.zeros_like(s)], axis=1))[clear].max() < 1e-9
+    before = plane.points(seam.points_B[:1] - 0.02 * seam.tangents_B[:1])
+    assert before[0] == pytest.approx([-0.02, 0.0, 0.0], abs=1e-9)
+    wire = np.stack([seam.points_B, seam.points_B + 0.03 * seam.normals_B], axis=1)
+    assert plane.arrows(wire)[:, 1] - plane.arrows(wire)[:, 0] == pytest.approx(np.tile([0.0, 0.0, 0.03], (201, 1)), abs=1e-9)
+    slight, bend = folded(0.6)
+    assert isinstance(plane_of(bend, (slight,)), Seen)
+    assert isinstance(plane_of(CLOUD, (SEAM,)), Seen)
+    assert isinstance(plane_of(CLOUD, ()), Seen)
+
+
+def test_an_unrolled_view_can_be_drawn(tmp_path: Path) -> None:
+    seam, cloud = folded(np.pi / 2)
+    found = SeamFindings(seams=(seam,), region=np.zeros(len(cloud), np.int32), method="profile")
+    path = torch_path(seam)
+    report = weld_report(found, (path,), scene="edge")
+    assert report.seed is None
+    assert write_png(tmp_path / "p.png", report, cloud, found, (path,)).stat().st_size > 10_000
+
+
+def test_the_legend_lies_beside_the_drawing() -> None:
+    figure = Figure(figsize=(16, 9), dpi=100)
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    _plan_view(figure, axes, plane_of(CLOUD, FOUND.seams), CLOUD, FOUND, (PATH,), surface=True)
+    figure.canvas.draw()
+    legend = axes.get_legend()
+    assert legend is not None
+    assert not legend.get_window_extent().overlaps(axes.get_window_extent().shrunk(1.0, 0.99))
+
+
+def test_a_seed_is_told_where_there_is_one(tmp_path: Path) -> None:
+    known = weld_report(FOUND, (PATH,), scene="sine", known=(KNOWN,), seed=0)
+    assert ", seed 0</p>" in write_html(tmp_path / "a.html", known, CLOUD, FOUND, (PATH,)).read_text()
+    assert ", seed " not in write_html(tmp_path / "b.html", replace(known, seed=None), CLOUD, FOUND, (PATH,)).read_text()
