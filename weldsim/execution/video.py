@@ -120,7 +120,9 @@ class WeldVideo:
     def pace(self) -> str:
         """How fast the film runs, in words: what is written into every picture."""
         speedup = self.config.speedup
-        return "at true speed" if speedup == 1 else f"{speedup:g} x as fast" if speedup > 1 else f"slowed to {100 * speedup:g} %"
+        if speedup == 1:
+            return "shown at true speed"
+        return f"shown {speedup:g} x as fast" if speedup > 1 else f"shown {1 / speedup:.3g} x as slow"
 
     @staticmethod
     def _clock(robot: SimulatedRobot) -> str:

@@ -20,7 +20,7 @@ from weldsim.report.view import CrossSection, ErrorLine, height_range, heights, 
 Figure = dict[str, Any]
 CLOUD_LIMIT = 60_000  # points drawn
 LONGEST = 1.0  # side of the scene, in units of plotly's camera
-SEEN = 0.82 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
+SEEN = 0.76 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
 WIDER = 1.6  # how much wider than high a scene is on a narrow page
 LINE_LIMIT = 3000  # samples drawn of one line
 
@@ -75,7 +75,7 @@ def scene(
             "aspectratio": _xyz(shape),
             "camera": {"eye": _xyz(eye), "up": _xyz(X_BS.R[:, 2])},
         },
-        "margin": {"l": 0, "r": 0, "t": 8, "b": 0},
+        "margin": {"l": 0, "r": 90, "t": 8, "b": 0},
         "legend": {"orientation": "h", "y": 0.01, "x": 0.01, "bgcolor": "rgba(255,255,255,0.8)", "itemsizing": "constant"},
     }
     return {"data": data, "layout": layout}
@@ -169,10 +169,11 @@ def errors_distance(lines: dict[str, ErrorLine], config: ReportConfig) -> Figure
     limits = {"mean": config.mean, "p95": config.p95, "max": config.max}
     layout["shapes"] = [_level(units.to_mm(value)) for value in limits.values()]
     layout["annotations"] = [
-        {"x": 1, "xref": "paper", "xanchor": "right", "y": units.to_mm(value), "yanchor": "bottom", "showarrow": False}
-        | {"text": f"limit of {name}", "font": {"size": 10, "color": SOFT}}
+        {"x": 1.01, "xref": "paper", "xanchor": "left", "y": units.to_mm(value), "yanchor": "middle", "showarrow": False}
+        | {"text": f"limit of<br>{name}", "align": "left", "font": {"size": 10, "color": SOFT}}
         for name, value in limits.items()
     ]
+    layout["margin"]["r"] = 56  # beside the plot: in it a line would run through the words
     return {"data": data, "layout": layout}
 
 

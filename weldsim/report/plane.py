@@ -70,7 +70,7 @@ def plane_of(cloud: PointCloud, seams: tuple[Seam, ...], welded: int = 0) -> Pla
     X_BS = view_frame(cloud, seams)
     if seams and bent(seams, X_BS):
         return Unrolled(seam=seams[min(welded, len(seams) - 1)])
-    return Seen(X_BS=X_BS)
+    return Seen(X_BS=X_BS) if seams else Seen(X_BS=X_BS, title="Seen along the cloud's normal")
 
 
 def bent(seams: tuple[Seam, ...], X_BS: Transform) -> bool:

@@ -146,7 +146,8 @@ def _plan_view(
         if many:
             _number(axes, plane, tip, f"{i + 1}")
     axes.set_xlabel("along [mm]", color=INK)
-    axes.set_ylabel("across [mm]", color=INK)
+    enlarged = "" if flat else f", {RATIO * np.ptp(window[:, 0]) / np.ptp(window[:, 1]):.0f} x as large"
+    axes.set_ylabel(f"across{enlarged} [mm]", color=INK)
     axes.set_aspect("equal" if flat else "auto")
     axes.set_facecolor(EMPTY)
     axes.set_xlim(*(1e3 * window[:, 0]))
@@ -155,8 +156,7 @@ def _plan_view(
         # Beside the title, over the drawing: there is no corner that a part or its seam may not lie in.
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, frameon=False, fontsize=9, borderaxespad=0.1)
     _plain(axes, grid=False)
-    enlarged = "" if flat else f", across it {RATIO * np.ptp(window[:, 0]) / np.ptp(window[:, 1]):.0f} x as large"
-    axes.set_title(plane.title + enlarged, loc="left", fontsize=13, color=INK)
+    axes.set_title(plane.title, loc="left", fontsize=13, color=INK)
 
 
 def _strip(seam: Seam) -> ndarray:
@@ -172,7 +172,7 @@ def _surface(figure: Figure, axes: Axes, points: ndarray, height: ndarray, findi
         1e3 * image, extent=extent, origin="lower", cmap="cividis", vmin=1e3 * low, vmax=1e3 * high, interpolation="nearest"
     )
     bar = figure.colorbar(drawn, ax=axes, orientation="horizontal", fraction=0.035, pad=0.085, aspect=50)
-    bar.set_label("height over the parent surface [mm]", color=INK)
+    bar.set_label(f"height over the {'parent surface' if findings.seams else 'middle of the cloud'} [mm]", color=INK)
     bar.outline.set_visible(False)
 
 

@@ -52,3 +52,27 @@ def test_a_failed_film_leaves_nothing(tmp_path: Path) -> None:
 def test_config_refuses_nonsense(bad: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match="video"):
         VideoConfig(**bad)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("speedup", "said"),
+    [(6.0, "shown 6 x as fast"), (1.0, "shown at true speed"), (0.25, "shown 4 x as slow"), (2.5, "shown 2.5 x as fast")],
+)
+def test_a_film_says_its_time_scale(tmp_path: Path, speedup: float, said: str) -> None:
+    film = WeldVideo(tmp_path / "weld.mp4", VideoConfig(speedup=speedup))
+    assert film.pace == said
+    assert film.frame_period == pytest.approx(speedup / film.config.fps)
+
+
+@pytest.mark.render
+def test_the_time_scale_is_written_into_the_picture(tmp_path: Path) -> None:
+    world = build_world(SceneConfig())
+    pictures = []
+    for speedup in (1.0, 6.0):
+        film = WeldVideo(tmp_path / "weld.mp4", VideoConfig(width=640, height=360, speedup=speedup, inset=False))
+        with film, SimulatedRobot(world.model, HOME) as robot:
+            pictures.append(film.picture(robot).astype(int))
+    rows, columns = np.nonzero(np.abs(pictures[0] - pictures[1]).max(axis=2) > 60)
+    assert len(rows) > 50
+    assert 55 < rows.min() < rows.max() < 85  # the line below the clock, and nothing else
+    assert columns.max() < 320
