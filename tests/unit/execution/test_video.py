@@ -70,7 +70,8 @@ def test_the_time_scale_is_written_into_the_picture(tmp_path: Path) -> None:
     pictures = []
     for speedup in (1.0, 6.0):
         film = WeldVideo(tmp_path / "weld.mp4", VideoConfig(width=640, height=360, speedup=speedup, inset=False))
-        with film, SimulatedRobot(world.model, HOME) as robot:
+        robot = SimulatedRobot(world.model, HOME)
+        with film, robot:
             pictures.append(film.picture(robot).astype(int))
     rows, columns = np.nonzero(np.abs(pictures[0] - pictures[1]).max(axis=2) > 60)
     assert len(rows) > 50
