@@ -135,7 +135,7 @@ def reach_picture(found: ReachMap, name: str) -> bytes:
     axes.plot(1e3 * found.points_B[:, 0], 1e3 * found.points_B[:, 1], color=SEAM, lw=3, label="the seam as it is")
     axes.plot(*(1e3 * found.now), "o", color=SEAM, ms=7)
     axes.add_patch(Circle((0, 0), 76, facecolor="#c9d3dc", edgecolor=INK))
-    axes.annotate("base of the arm", (0, 0), ha="center", va="center", fontsize=8, color=INK)
+    axes.annotate("arm's base", (0, 0), ha="center", va="center", fontsize=8, color=INK)
     axes.set_aspect("equal")
     axes.set_axisbelow(True)
     axes.set_xlim(low[0] - 40, low[0] + size[0] + 40)
