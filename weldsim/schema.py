@@ -103,7 +103,13 @@ def describe(cls: type, *, prefix: str = "") -> list[FieldDoc]:
 
 @cache
 def _field_docs(cls: type) -> dict[str, str]:
-    """Doc of each field: the string under it, else its entry in the class docstring's Attributes."""
+    """Doc of each field: the string under it, else its entry in the class docstring's Attributes; else that of a base class."""
+    inherited = {name: text for base in reversed(cls.__mro__[1:]) if is_dataclass(base) for name, text in _field_docs(base).items()}
+    return inherited | _own_docs(cls)
+
+
+def _own_docs(cls: type) -> dict[str, str]:
+    """Doc of each field that a class documents itself."""
     names = {entry.name for entry in fields(cls)}
     entries = re.finditer(
         r"(?:^\s*|  )(\w+(?:, \w+)*): (.+?)(?=\n\s*\w+(?:, \w+)*:|  \w+(?:, \w+)*: |\n\n|\Z)", cls.__doc__ or "", re.M | re.S

@@ -82,7 +82,7 @@ def test_opening_is_the_midpoint_of_the_lips_at_most_half_a_millimetre_apart(sce
 def test_every_figure_says_its_reference():
     assert get_args(Reference) == ("opening", "root", "gap_mid")
     assert a_seam().reference == "opening"
-    figures = {name: 0.0 for name in LineError.__annotations__ if name != "reference"}
+    figures = {name: 0.0 for name in LineError.__annotations__ if name not in ("reference", "closed")}
     assert LineError(**figures).reference == "opening"
 
 

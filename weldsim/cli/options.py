@@ -18,7 +18,7 @@ Settings = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(m
 SceneName = Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SCENE")]
 Method = Literal["profile", "thesis"]
 SCENE_PREFIX = "scene."
-EVERYTHING = ("twin", "sensor", "stereo", "kinect", "cloud", "scan", "seam", "path", "motion", "execution", "report")
+EVERYTHING = ("twin", "sensor", "d435", "stereo", "kinect", "cloud", "scan", "seam", "path", "motion", "execution", "report")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -161,7 +161,7 @@ class Plan(ConfigOptions):
 
         for unit in DEPTH_UNITS:
             try:
-                check_reach(replace(self, depth_unit=unit)._read(config))
+                check_reach(replace(self, depth_unit=units.parse(unit, "m"))._read(config))
             except InputError:
                 continue
             return f'; with --depth-unit "{unit}" it lies within reach'

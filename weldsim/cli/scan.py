@@ -17,7 +17,7 @@ CLOUDS = (".ply", ".npz", ".xyz", ".txt")
 class Scan(ConfigOptions):
     """Let the twin scan a scene, and write what the camera saw as `weldsim plan` reads it."""
 
-    reads: ClassVar[tuple[str, ...]] = ("twin", "sensor", "stereo", "kinect", "cloud", "scan", "motion", "execution")
+    reads: ClassVar[tuple[str, ...]] = ("twin", "sensor", "d435", "stereo", "kinect", "cloud", "scan", "motion", "execution")
 
     scene: SceneName
     """Name of a scene (`weldsim scenes`), or a TOML file."""

@@ -35,9 +35,9 @@ def test_a_unit_and_a_viewpoint_that_are_proposed_are_taken_as_they_are_printed(
     unit = re.search(r"pass (--units \w+)", refused(capsys, tmp_path / "part.npy"))
     assert unit is not None
     words = [tmp_path / "part.npy", *unit[1].split()]
-    viewpoint = re.search(r"(--viewpoint [-0-9. ]+)$", refused(capsys, *words, "--viewpoint", 0, -450, 420).strip())
-    assert viewpoint is not None
-    assert "no seam found" in refused(capsys, *words, *viewpoint[1].split(), code=1)
+    meant = re.search(r'"(-450 mm)" is meant', refused(capsys, *words, "--viewpoint", 0, -450, 420))
+    assert meant is not None
+    assert "no seam found" in refused(capsys, *words, "--viewpoint", 0, meant[1], "420 mm", code=1)
 
 
 def test_a_depth_unit_that_is_proposed_is_taken_as_it_is_printed(tmp_path: Path, capsys) -> None:
