@@ -75,3 +75,32 @@ def test_a_groove_may_fade_at_one_end_and_leave_the_plate_at_the_other(
     before, after = end_errors(start, stop, low, high, turn)
     assert abs(before) < (0.8e-3 if low < start else 1.3e-3)
     assert abs(after) < (0.8e-3 if stop < high else 1.3e-3)
+
+
+@pytest.mark.parametrize("shorter", [0.04, -0.01])
+@pytest.mark.parametrize("turn", TURNS)
+def test_a_bevel_that_goes_on_past_its_partner_is_not_followed(turn: float, shorter: float) -> None:
+    """Two bevelled plates, one of them shorter: the groove ends with it; 20 mm below lies a table."""
+    x, y = np.meshgrid(np.arange(-0.1, 0.1, SPACING), np.arange(-0.08, 0.08, SPACING))
+    below = DEPTH * np.maximum(1 - np.abs(y) / (WIDTH / 2), 0.0)
+    below = np.where((y < 0) & (x > shorter), 0.020, below)
+    X_BP = Transform("BP", matrix_from_rotation_vector(np.array([0.0, 0.0, turn])), np.array([0.1, -0.5, 0.02]))
+    points = X_BP.points(np.stack([x, y, -below], axis=-1).reshape(-1, 3))
+    (seam,) = find_seams_profile(PointCloud(points=points, viewpoints=X_BP.p[None] + [0.0, 0.0, 0.45]), ProfileConfig()).seams
+    found = np.sort(X_BP.inverse().points(seam.points_B[[0, -1]])[:, 0])
+    assert abs(found[0] + 0.1) < 2.5e-3
+    assert abs(found[1] - shorter) < 2.5e-3  # a cell of the parent surface is 2 mm wide
+
+
+@pytest.mark.parametrize("slant", [0.6, -0.7])
+def test_a_groove_that_leaves_its_plate_at_a_slant_ends_at_the_edge(slant: float) -> None:
+    """The plate's edges lie at an angle to the groove: its middle ends where they cross it, and its line stays on it."""
+    x, y = np.meshgrid(np.arange(-0.16, 0.16, SPACING), np.arange(-0.09, 0.09, SPACING))
+    along = x - np.tan(slant) * y
+    inside = np.abs(along) < 0.08
+    below = DEPTH * np.maximum(1 - np.abs(y) / (WIDTH / 2), 0.0)
+    points = np.stack([x, y - 0.5, -below], axis=-1)[inside]
+    (seam,) = find_seams_profile(PointCloud(points=points, viewpoints=np.array([[0.0, -0.5, 0.45]])), ProfileConfig()).seams
+    ends = np.sort(seam.points_B[[0, -1], 0])
+    assert np.abs(ends - [-0.08, 0.08]).max() < 3e-3
+    assert np.abs(seam.points_B[:, 1] + 0.5).max() < 0.5e-3
