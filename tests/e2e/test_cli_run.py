@@ -25,6 +25,7 @@ from weldsim.scene.files import scene_names
 
 pytestmark = pytest.mark.render
 
+ONE_VIEW = ("--set", 'scene.views=[{standoff="400 mm"}]')
 FILES = {
     *("config.json", "path.json", "path.csv", "cloud.ply", "depth.png", "depth.intrinsics.json", "depth.pose.json"),
     *("scan.npz", "report.json", "report.html", "report.png", "run.json"),
@@ -49,7 +50,11 @@ def test_a_run_says_its_verdict_and_leaves_one_folder(welded):
     assert [path.name for path in (folder / "runs").iterdir()] == ["straight-1"]
     assert report["written"] == ["runs/straight-1"]
     made = folder / "runs" / "straight-1"
-    assert {path.name for path in made.iterdir()} == {*FILES, "log.npz"}
+    views = {f"depth_{view}{path[5:]}" for view in (0, 1) for path in FILES if path.startswith("depth")}
+    assert {path.name for path in made.iterdir()} == {path for path in FILES if not path.startswith("depth")} | views | {
+        "log.npz",
+        "views.json",
+    }
     assert json.loads((made / "report.json").read_text())["executed"] == report["executed"]
     manifest = json.loads((made / "run.json").read_text())
     assert (manifest["schema"], manifest["scene"], manifest["seed"]) == ("weldsim.run/1", "straight", 1)
@@ -107,7 +112,7 @@ def test_the_same_seed_gives_the_same_bytes_in_another_process_and_the_earlier_r
     assert ("PASSED" if code == 0 else "FAILED") in out.splitlines()[0]
     paths = [read_path_json(folder / "path.json") for folder in (old, welded[0] / "runs/straight-1")]
     assert path_text(paths[0], timing=False) == path_text(paths[1], timing=False)
-    assert (old / "depth.png").read_bytes() == (welded[0] / "runs/straight-1/depth.png").read_bytes()
+    assert (old / "depth_0.png").read_bytes() == (welded[0] / "runs/straight-1/depth_0.png").read_bytes()
     assert "the run that was in again is now again.1" in out
     assert not (old / "left.txt").exists()
     assert (tmp_path / "again.1" / "left.txt").read_text() == "from an earlier run"
@@ -131,7 +136,7 @@ def test_a_plate_without_a_seam_passes_when_none_is_found(tmp_path, monkeypatch,
 
 def test_what_the_twin_scans_can_be_planned(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["scan", "curve", "--seed", "4", "--out", "scan.ply", "--depth", "depth.png", "--json"]) == 0
+    assert main(["scan", "curve", *ONE_VIEW, "--seed", "4", "--out", "scan.ply", "--depth", "depth.png", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["written"] == ["scan.ply", "depth.png", "depth.intrinsics.json", "depth.pose.json"]
     cloud = read_cloud("scan.ply")

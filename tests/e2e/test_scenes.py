@@ -95,7 +95,8 @@ def mine(tmp_path, monkeypatch) -> Path:
 @pytest.mark.render
 @pytest.mark.slow
 def test_ones_own_part_is_scanned_welded_and_judged(mine, capsys):
-    assert main(["run", "job/mine.toml", "--json"]) == 0
+    two_views = 'scene.views=[{standoff="400 mm"}, {standoff="400 mm", tilt="15 deg", heading="90 deg"}]'
+    assert main(["run", "job/mine.toml", "--set", two_views, "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["plan"]["mean"] < 0.4e-3
     assert report["iou"] > 0.85

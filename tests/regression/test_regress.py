@@ -252,12 +252,15 @@ def test_a_view_out_of_reach_is_said_and_not_an_end(tmp_path):
     from weldsim.scene.config import SceneConfig
     from weldsim.scene.files import scene_path
 
-    tables = apply_overrides({"name": "far", **load_toml(scene_path("straight"))}, ["pose.y=-1500 mm", "name=far"])
+    tables = apply_overrides(
+        {"name": "far", **load_toml(scene_path("straight"))},
+        ["pose.x=400 mm", "pose.y=-600 mm", "pose.clearance=700 mm", "fixture.clamps=0", "name=far"],
+    )
     far = structure(tables, SceneConfig)
     seen = regress([far], methods=("profile",), seeds=1)
     assert "scan view" in seen.rows[0].figures.refused
     assert (seen.rows[0].figures.missed, seen.passed) == (1, True)
-    near = regress([replace(far, pose=replace(far.pose, y=-0.45))], methods=("profile",), seeds=1)
+    near = regress([replace(far, pose=replace(far.pose, x=0.0, y=-0.45, clearance=0.0))], methods=("profile",), seeds=1)
     golden = updated(Golden(), [row.figures for row in near.rows], "where it was in reach")
     worse = regress([far], methods=("profile",), seeds=1, golden=golden, keep=tmp_path)
     assert "missed" in {deviation.figure for deviation in worse.deviations}

@@ -129,7 +129,7 @@ def test_a_camera_that_there_is_not_is_no_other_camera():
         "import weldsim\ntry:\n    weldsim.look('plain', sensor='d416')\nexcept weldsim.WeldsimError as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert "sensor 'd416' is not one of d415, d415-stereo, kinect, exact" in done.stdout
+    assert "sensor 'd416' is not one of d415, d435, d415-stereo, kinect, exact" in done.stdout
 
 
 CLOUD = PointCloud(points=POINTS)
