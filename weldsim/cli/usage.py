@@ -168,6 +168,8 @@ def _said_better(message: str, name: str, words: Sequence[str]) -> str:
         meant = _action_meant(name, wrong, words) if where == "action" else nearest(wrong, choices)
         return f"{where} {wrong!r} is not one of {', '.join(choices)}{f'; did you mean {meant}?' if meant else ''}"
     if match := _NUMBER.match(message):
+        if (name, match[1]) == ("run", "--seam"):
+            return f"--seam {match[2]!r} is neither a whole number nor all"
         whole = "whole " if "int()" in message or "INT" in message else ""
         return f"{match[1]} {match[2]!r} is no {whole}number"
     if match := _MISSING.match(message):

@@ -89,7 +89,7 @@ def test_the_reach_map_is_what_the_arm_can_do():
     near = np.hypot(*np.meshgrid(found.x, found.y)) < 0.12
     assert near.any()
     assert not found.good[near].any()
-    assert 0.2 < found.share < 0.98
+    assert 0.2 < found.good.mean() < 0.98
 
 
 def test_a_place_at_which_the_part_stands_in_the_arm_will_not_do():

@@ -75,7 +75,10 @@ def test_a_plain_plate_has_no_seam(noise) -> None:
     made = groove_cloud(np.random.default_rng(1), width=0.0, noise=noise, table=False)
     found = find_seams_thesis(made.cloud, CONFIG)
     assert found.seams == ()
-    assert "descriptor" in found.rejected[0].reason
+    # Waves of a measured D415 may leave a few boundary points, too few for a line.
+    assert any(
+        word in found.rejected[0].reason for word in (["descriptor", "ordered path points"] if noise == "d415" else ["descriptor"])
+    )
 
 
 @pytest.mark.parametrize(
