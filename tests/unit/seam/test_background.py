@@ -8,7 +8,9 @@ from tests.clouds import groove_cloud
 from weldsim.cloud.files import read_cloud
 from weldsim.records import PointCloud
 from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.background import Standing
 from weldsim.seam.profile.find import find_seams_profile
+from weldsim.seam.profile.judge import DOUBTFUL, FOUND, doubt
 from weldsim.sensor.noise import NoiseField, disparity_noise
 
 CONFIG = ProfileConfig()
@@ -52,10 +54,25 @@ def test_a_furrow_that_the_waves_cannot_make_is_found(seed: int) -> None:
     assert seam.length == pytest.approx(0.24, abs=0.035)  # where it fades into the waves is not to be seen to a centimetre
 
 
-def test_a_furrow_no_deeper_than_the_waves_is_not_found_but_may_be_doubtful() -> None:
-    findings = find_seams_profile(wavy_plate(1, depth=0.0008), CONFIG)
-    assert findings.seams == ()
-    assert all("doubtful" in each.reason for each in findings.rejected if each.doubtful)
+def test_a_furrow_no_deeper_than_the_waves_is_not_found() -> None:
+    assert find_seams_profile(wavy_plate(1, depth=0.0008), CONFIG).seams == ()
+
+
+@pytest.mark.parametrize(
+    ("ratio", "told"), [(FOUND + 2.1, None), (FOUND + 1.9, True), (DOUBTFUL + 2.1, True), (DOUBTFUL + 1.9, False)]
+)
+def test_what_may_be_a_groove_is_told_apart_from_waves(ratio: float, told: bool | None) -> None:
+    """Of four independent stretches a line that chooses its way gains two deviations."""
+    why = doubt([Standing(ratio=ratio, looks=4.0, spread=0.2, alike=2.0, elsewhere=900)])
+    assert (None if why is None else why[1]) is told
+    assert why is None or ("doubtful" in why[0]) is told
+
+
+def test_pieces_of_one_seam_stand_out_together() -> None:
+    one = Standing(ratio=0.8 * FOUND + 2.0, looks=4.0, spread=0.2, alike=2.0, elsewhere=900)
+    assert doubt([one]) is not None
+    assert doubt([one, one]) is None
+    assert doubt([None]) is not None, "what no chart shows is no groove"
 
 
 @pytest.mark.parametrize("view", ["known", "unknown"])

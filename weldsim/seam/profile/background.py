@@ -169,7 +169,7 @@ def _own_surface(cells: Int[ndarray, "m a w 2"], chart: Chart) -> Bool[ndarray, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a block without any
         usual = np.nanmedian(here, axis=1)
-    low, high = np.nanmin(usual, axis=0) - MODE_REACH, np.nanmax(usual, axis=0) + MODE_REACH
+        low, high = np.nanmin(usual, axis=0) - MODE_REACH, np.nanmax(usual, axis=0) + MODE_REACH
     return np.asarray(((slope > low) & (slope < high)).all(axis=-1))
 
 
