@@ -32,6 +32,7 @@ __all__ = ["LengthUnit", "check_plannable", "read_cloud", "read_depth_frame", "w
 LengthUnit = Literal["m", "cm", "mm", "in"]
 _OTHERS = {b"LASF": "a LAS or LAZ file", b"ASTM-E57": "an E57 file", b"solid ": "an STL mesh", b"OFF": "an OFF mesh"}
 MIN_POINTS = 100  # fewer cannot show a groove
+SAMPLE = 20_000  # points tell the breadth of a cloud that is no line
 MIN_BREADTH = 0.001  # [m] rms breadth across the longest direction below which the points are a line
 
 
@@ -163,14 +164,21 @@ def check_plannable(cloud: PointCloud) -> None:
     span = max(float(column.max() - column.min()) for column in columns)
     if span < MIN_SPAN:
         raise CloudError(f"the cloud spans {span * 1e3:.3g} mm, planning needs {MIN_SPAN * 1e3:g} mm; check its unit", span=span)
-    centred = np.stack([column - column.mean() for column in columns])
-    breadth = float(np.sqrt(max(0.0, np.linalg.eigvalsh(centred @ centred.T / len(cloud))[1])))
+    breadth = _breadth(cloud.points[:: max(1, len(cloud) // SAMPLE)])
+    if breadth < MIN_BREADTH:
+        breadth = _breadth(cloud.points)
     if breadth < MIN_BREADTH:
         raise CloudError(
             f"the cloud is a line: its points lie within {breadth * 1e3:.2g} mm rms of it (least {MIN_BREADTH * 1e3:g} mm)",
             breadth=breadth,
         )
     check_reach(cloud)
+
+
+def _breadth(points: Float[ndarray, "n 3"]) -> float:
+    """rms distance of points from the line along which they are longest, seen in the broadest direction [m]."""
+    centred = points - points.mean(axis=0)
+    return float(np.sqrt(max(0.0, np.linalg.eigvalsh(centred.T @ centred / len(points))[1])))
 
 
 def write_cloud(path: str | Path, cloud: PointCloud) -> Path:

@@ -59,20 +59,35 @@ def test_a_furrow_no_deeper_than_the_waves_is_not_found() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ratio", "told"), [(FOUND + 2.1, None), (FOUND + 1.9, True), (DOUBTFUL + 2.1, True), (DOUBTFUL + 1.9, False)]
+    ("score", "told"), [(FOUND + 0.1, None), (FOUND - 0.1, True), (DOUBTFUL + 0.1, True), (DOUBTFUL - 0.1, False)]
 )
-def test_what_may_be_a_groove_is_told_apart_from_waves(ratio: float, told: bool | None) -> None:
-    """Of four independent stretches a line that chooses its way gains two deviations."""
+def test_what_may_be_a_groove_is_told_apart_from_waves(score: float, told: bool | None) -> None:
+    """Of four independent stretches a line that chooses its way gains two deviations, and two may lie in one odd place."""
+    ratio = 2.0 + score * np.sqrt(1.5)
     why = doubt([Standing(ratio=ratio, looks=4.0, spread=0.2, alike=2.0, elsewhere=900)])
     assert (None if why is None else why[1]) is told
     assert why is None or ("doubtful" in why[0]) is told
 
 
 def test_pieces_of_one_seam_stand_out_together() -> None:
-    one = Standing(ratio=0.8 * FOUND + 2.0, looks=4.0, spread=0.2, alike=2.0, elsewhere=900)
+    one = Standing(ratio=2.0 + 0.8 * FOUND * np.sqrt(1.5), looks=4.0, spread=0.2, alike=2.0, elsewhere=900)
     assert doubt([one]) is not None
     assert doubt([one, one]) is None
     assert doubt([None]) is not None, "what no chart shows is no groove"
+
+
+def test_few_looks_are_believed_less() -> None:
+    """A dent of a bare table is as deep as its waves are nowhere else, over as little as two of their lengths."""
+    few, many = (Standing(ratio=7.5 + np.sqrt(looks), looks=looks, spread=0.2, alike=2.0, elsewhere=900) for looks in (2.0, 12.0))
+    assert doubt([few]) is not None
+    assert doubt([many]) is None
+
+
+@pytest.mark.parametrize(("elsewhere", "sighted", "found"), [(0, True, True), (0, False, False), (40, False, True)])
+def test_what_nothing_can_be_compared_with_is_doubtful_without_a_viewpoint(elsewhere: int, sighted: bool, found: bool) -> None:
+    why = doubt([Standing(ratio=30.0, looks=9.0, spread=0.1, alike=1.0, elsewhere=elsewhere, sighted=sighted)])
+    assert (why is None) is found
+    assert why is None or why[1], "it may be one"
 
 
 @pytest.mark.parametrize("view", ["known", "unknown"])
@@ -98,6 +113,16 @@ def test_real_tables_shadows_and_holes_hold_no_groove(real_data, name: str, view
     cloud = read_cloud(real_data / f"{name}.pcd")
     seen: ndarray = np.array(viewpoint, float).reshape(-1, 3)
     assert find_seams_profile(PointCloud(points=cloud.points, viewpoints=seen), CONFIG).seams == ()
+
+
+@pytest.mark.parametrize("name", ["a", "b", "c", "d"])
+def test_another_sample_of_a_real_table_holds_no_groove_either(real_data, name: str) -> None:
+    """Other tables are to be had only by leaving points out, and by mirroring."""
+    points = read_cloud(real_data / f"wavy_table/{name}.pcd").points
+    for seed in range(2):
+        keep = np.random.default_rng(seed).random(len(points)) < 0.8
+        cloud = PointCloud(points=points[keep] * [1 - 2 * seed, 1, 1], viewpoints=np.array([[0.0, -0.75, 0.75]]))
+        assert find_seams_profile(cloud, CONFIG).seams == ()
 
 
 @pytest.mark.parametrize("seed", range(2))

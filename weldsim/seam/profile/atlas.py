@@ -6,6 +6,7 @@ thinnest direction, and one for each further direction that much of its surface 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -92,10 +93,16 @@ class Atlas:
         )
         if len(index) <= most:
             return index
-        # Random: an even stride would beat against the rows of a depth image. By a rank that each point of the cloud keeps,
-        # whatever else is near: with one point more or less around a line, a draw among them would be another sample.
-        rank = np.random.default_rng(0).random(len(self.cloud))[index]
-        return index[np.sort(np.argpartition(rank, most)[:most])]
+        return index[np.sort(np.argpartition(self._rank[index], most)[:most])]
+
+    @cached_property
+    def _rank(self) -> Float[ndarray, "n"]:
+        """By which points are left out where there are more than enough.
+
+        Random: an even stride would beat against the rows of a depth image. And a point of the cloud keeps it, whatever else is
+        near: with one point more or less around a line, a draw among them would be another sample.
+        """
+        return np.random.default_rng(0).random(len(self.cloud))
 
     def within_reach(self, line: Float[ndarray, "k 3"]) -> Int[ndarray, "m"]:
         """Indices of all points, of whatever view, that may lie within SURROUNDINGS of a line (k, 3) [m], and of some more."""

@@ -38,6 +38,7 @@ SHOWN = 0.5  # of the candidate's own blocks a chart must hold to speak of it
 LAGS = 12  # blocks over which correlation along the line is followed
 LEAST_CORRELATION = 0.05  # under which the rest is taken as independent
 CLIP = 3.0  # standard deviations at which a block counts as no more, in the correlation
+ODD_PLACE = 2.0  # looks that one odd place of a surface may spoil
 FREEDOM = 1.0  # standard deviations that each independent stretch gains by the line's being led along the deepest places
 
 
@@ -51,6 +52,7 @@ class Standing:
         spread: standard deviation of a block's amplitude elsewhere, in units of the candidate's own section.
         alike: blocks over which the background is alike.
         elsewhere: blocks placed elsewhere; 0 where the surface has no other place, and the candidate's own scatter is taken.
+        sighted: whether it is seen from a known viewpoint: without one, the back of a thing may look like a groove in another.
     """
 
     ratio: float
@@ -58,11 +60,13 @@ class Standing:
     spread: float
     alike: float
     elsewhere: int
+    sighted: bool = True
 
     @property
     def score(self) -> float:
-        """`ratio` less what a line that may choose its way gains from noise alone."""
-        return self.ratio - FREEDOM * float(np.sqrt(self.looks))
+        """`ratio` less what a line that may choose its way gains from noise alone; of few looks less is believed, since all of
+        them may lie in one odd place: a dent, a hole's rim."""
+        return (self.ratio - FREEDOM * float(np.sqrt(self.looks))) / float(np.sqrt(1 + ODD_PLACE / self.looks))
 
 
 def standing(
@@ -156,7 +160,7 @@ def _compared(blocks: _Blocks, grooves: Sequence[Float[ndarray, "_ 3"]], chart: 
     else:
         alike, number = _alike(placed / max(spread, 1e-9), len(own)), int(np.isfinite(placed).sum())
     looks = len(own) / alike
-    return Standing(float(own.mean()) / max(spread, 1e-6) * float(np.sqrt(looks)), looks, spread, alike, number)
+    return Standing(float(own.mean()) / max(spread, 1e-6) * float(np.sqrt(looks)), looks, spread, alike, number, chart.perspective)
 
 
 def _own_surface(cells: Int[ndarray, "m a w 2"], chart: Chart) -> Bool[ndarray, "r c"]:
@@ -222,11 +226,13 @@ def _amplitudes(
         depth = total[enough] / np.maximum(count[enough], 1)
         u = x / np.abs(x).max()
         design = np.stack([-blocks.section, np.ones_like(u), u, u**2], axis=1)
-        gram = np.einsum("kx,xi,xj->kij", weight, design, design, optimize=True)
-        inverse = np.linalg.inv(gram + 1e-12 * np.eye(4))
+        whole = np.linalg.inv(design.T @ design + 1e-12 * np.eye(4))
+        inverse = np.repeat(whole[None], len(weight), axis=0)
+        lacking = ~held[enough].all(axis=1)
+        products = (design[:, :, None] * design[:, None, :]).reshape(len(u), 16)
+        inverse[lacking] = np.linalg.inv((weight[lacking] @ products).reshape(-1, 4, 4) + 1e-12 * np.eye(4))
         theta = np.einsum("kij,kj->ki", inverse, (weight * depth) @ design)
-        whole = np.linalg.inv(design.T @ design + 1e-12 * np.eye(4))[0, 0]
-        amplitude[enough] = np.where(inverse[:, 0, 0] < BLUNTED * whole, theta[:, 0], np.nan)
+        amplitude[enough] = np.where(inverse[:, 0, 0] < BLUNTED * whole[0, 0], theta[:, 0], np.nan)
         left = weight * (depth - theta @ design.T) ** 2
         rough[enough] = np.sqrt(left.sum(axis=1) / weight.sum(axis=1))
     return amplitude, rough

@@ -207,28 +207,25 @@ def _chart(
     perspective: bool,
 ) -> Chart:
     """The chart of points at image coordinates (u, v) with chart heights [m]; those not in `front` are left out."""
+    from weldsim.seam.profile import native
+
     scale = depth0 if perspective else 1.0
     low, high = np.array([_tails(u, TAIL), _tails(v, TAIL)]).T
     step, sparse = _cell_size(u, v, low, high, scale)
     corner = low - 2 * step
     columns, rows = np.ceil((high + 2 * step - corner) / step).astype(int)
     u, v = (u - corner[0]) / step, (v - corner[1]) / step
-    column, row = np.floor(u), np.floor(v)
-    inside = front & (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-    cell = np.where(inside, row * columns + column, -1.0).astype(np.int64)
-    shape, size = (int(rows), int(columns)), int(rows * columns)
-
-    def summed(values: Float[ndarray, "n"] | None = None) -> Float[ndarray, "h w"]:
-        """Over the points of each cell; their number without values."""
-        return np.bincount(cell + 1, weights=values, minlength=size + 1)[1:].reshape(shape).astype(float)
-
-    count, total = summed(), summed(height)
+    shape = (int(rows), int(columns))
+    cell, count, total = np.empty(len(u), np.int64), np.zeros(shape), np.zeros(shape)
+    native.sort_into_cells(u, v, height, front, cell, count, total)
     image = np.divide(total, count, out=np.zeros(shape), where=count > 0)
     valid = count > 0
     scattered = None
     if sparse > SPARSE * step:
-        u, v = u - column - 0.5, v - row - 0.5
-        sums = [summed(a) for a in (u, v, u * u, v * v, u * v, u * height, v * height)]
+        inside = cell >= 0
+        at, u, v, height = cell[inside], u[inside] % 1.0 - 0.5, v[inside] % 1.0 - 0.5, height[inside]
+        each = (u, v, u * u, v * v, u * v, u * height, v * height)
+        sums = [np.bincount(at, weights=values, minlength=count.size).reshape(shape) for values in each]
         scattered = Scattered(count, total, sums[0], sums[1], sparse / step)
         image, valid = scattered.heights(np.stack(sums[2:]))
     else:
@@ -289,11 +286,12 @@ def _cell_size(
     A table seen at a flat angle is dense in the chart: it must not decide for a part that is not. So the spacing is that
     of a lower quantile of the blocks that lie wholly within the data.
     """
+    from weldsim.seam.profile import native
+
     extent = np.maximum(high - low, 1e-9)
     block = max(float(extent.max()) / BLOCKS, 1e-12)
-    at_u, at_v = (np.clip(np.floor((at - least) / block), -1, BLOCKS) + 1 for at, least in zip((u, v), low, strict=True))
-    at = (at_u * (BLOCKS + 2) + at_v).astype(np.int64)
-    count = np.bincount(at, minlength=(BLOCKS + 2) ** 2).reshape(BLOCKS + 2, BLOCKS + 2)
+    count = np.zeros((BLOCKS + 2, BLOCKS + 2), np.int64)
+    native.count_blocks(u, v, float(low[0]), float(low[1]), block, count)
     within = cv2.erode((count > 0).astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
     spacing = sparse = block * float(np.sqrt(np.count_nonzero(count) / len(u)))
     if np.count_nonzero(within) >= FEWEST_BLOCKS:

@@ -12,10 +12,10 @@ from weldsim.seam.profile.refine import BRIDGE, Fit
 MISFIT_LIMIT = 0.75
 MIN_SUPPORT = 0.5
 MOST_LAPSES = 0.18
-LOOKS = 1.5  # looks at the depth, that a groove is longer than: a hole is drawn out to one
-FOUND = 5.0  # score of a `Standing`, from which on it is a groove; waves of bare tables, real and simulated, reach 3.5
+LOOKS = 2.0  # looks at the depth, that a groove is longer than: a hole is drawn out to one, and by its own length
+FOUND = 6.0  # score of a `Standing`, from which on it is a groove; waves of bare tables, real and simulated, reach 4.6
 CLEAR = 6.0  # score at which 37 % of the doubt is left
-DOUBTFUL = 3.5  # from which on it is named as one that there may be
+DOUBTFUL = 4.0  # from which on it is named as one that there may be
 
 
 def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: bool = False) -> str | None:
@@ -56,7 +56,9 @@ def doubt(standings: Sequence[Standing | None]) -> tuple[str, bool] | None:
     """
     over = score(standings)
     if over >= FOUND:
-        return None
+        if any(each.elsewhere > 0 or each.sighted for each in standings if each is not None):
+            return None
+        return "doubtful: its surface has no other place to compare it with, and no viewpoint is known", True
     clause = f"stands {max(over, 0.0):.1f} times over what the surface does elsewhere, under {FOUND:g}"
     return (f"doubtful: {clause}", True) if over >= DOUBTFUL else (clause, False)
 

@@ -114,7 +114,7 @@ def _leaning(base: Float[ndarray, "7"], lean: float, blur: float, floor: float) 
 
 def _calm(starts: Float[ndarray, "s 7"], views: Views, blocks: Blocks, step: float) -> list[Solution]:
     """Solutions with cells taken as independent: what hangs together makes the cost rugged far from its minimum."""
-    plain = replace(views, weight=views.weight * 0.1, white=np.eye(len(blocks.x)))
+    plain = replace(views, weight=views.weight * 0.1, white=np.empty((0, 0)))
     return solve(starts, _all_but_lean(), plain, step, most=10)
 
 
@@ -130,7 +130,10 @@ def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: f
     And whether the data insist on a lean.
     """
     found = _at_leans(base, FEW_LEANS, views, blocks, step)
-    symmetric = found[0] = _either(found[0].theta, views, step)
+    # Where it came from may be better than what independent cells led to.
+    upright = base.copy()
+    upright[LEAN] = 0.0
+    symmetric = found[0] = min((_either(theta, views, step) for theta in (found[0].theta, upright)), key=lambda each: each.cost)
     free = _freed(found, views, blocks, step)
     gain = _gain(symmetric, free, views, blocks, step)
     if gain > WORTH_A_LOOK:
@@ -216,7 +219,7 @@ def _variance(found: Solution, views: Views, blocks: Blocks, step: float) -> flo
     depth, jacobian = predict(found.theta[None], step, views.at, views.shear)
     free = found.free & (found.theta > LOW) & (found.theta < HIGH)
     free[:3] = True
-    slopes = terms(found.theta[None], views, step)[1][0][free]
+    slopes = terms(found.theta, views, step)[1][free]
     inverse = np.linalg.pinv(slopes @ slopes.T + 1e-9 * np.eye(len(slopes)), rcond=1e-10, hermitian=True)
     score = np.einsum("p,pbn->bn", inverse[0], _scores(jacobian[0][free], depth[0], views, blocks))
     n, p = len(score), len(slopes)

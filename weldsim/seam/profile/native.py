@@ -1,6 +1,6 @@
-"""The loop over points that a rail is laid through, compiled by numba on first use and cached.
+"""Loops over points and cells, compiled by numba on first use and cached.
 
-Import this module inside functions only: it brings numba in, which takes longer than the loop saves a short-lived process.
+Import this module inside functions only: it brings numba in, which takes long.
 """
 
 from typing import no_type_check
@@ -107,31 +107,45 @@ def coordinates(points, origins, station, places, t, e, n, step, s, x, h, slope,
 
 @_jit
 @no_type_check
-def normal_equations(design, weight, h, part, gram, right):
+def held_columns(design, held):
+    """The columns in which each row of design (k, p) is not zero, into held (k, q), -1 after the last of them; q is as many as
+    the fullest row has."""
+    for i in range(len(design)):
+        count = 0
+        for a in range(design.shape[1]):
+            if design[i, a] != 0.0:
+                held[i, count] = a
+                count += 1
+        held[i, count:] = -1
+
+
+@_jit
+@no_type_check
+def normal_equations(design, held, weight, h, part, gram, right):
     """Adds each row's share to the normal equations of the part it belongs to.
 
     A row of B-splines is mostly zeros, which are passed over; and the sums come out alike on every processor.
 
     Args:
-        design: (k, p).  weight, h: (k,).  part: (k,) from 0.  gram: (q, p, p), right: (q, p), zeros at first.
+        design: (k, p).  held: of `held_columns`.  weight, h: (k,).  part: (k,) from 0.  gram: (q, p, p), right: (q, p), zeros
+            at first.
     """
-    rows, size = design.shape
-    held = np.empty(size, np.int64)
-    for i in range(rows):
+    size, most = design.shape[1], held.shape[1]
+    for i in range(len(design)):
         w, q = weight[i], part[i]
         if w == 0.0:
             continue
-        count = 0
-        for a in range(size):
-            if design[i, a] != 0.0:
-                held[count] = a
-                count += 1
-        for one in range(count):
-            a = held[one]
+        for one in range(most):
+            a = held[i, one]
+            if a < 0:
+                break
             scaled = design[i, a] * w
             right[q, a] += scaled * h[i]
-            for other in range(one, count):
-                gram[q, a, held[other]] += scaled * design[i, held[other]]
+            for other in range(one, most):
+                b = held[i, other]
+                if b < 0:
+                    break
+                gram[q, a, b] += scaled * design[i, b]
     for q in range(len(gram)):
         for a in range(size):
             for b in range(a):
@@ -163,35 +177,35 @@ def profiles(row, column, shifts, known, values, total, count):
 
 @_jit
 @no_type_check
-def blurred(v, x, wide, share, turn, changed, moved, depth, jacobian):
-    """Adds what a blurred polyline's corners make of its depth and of how that changes: `weldsim.seam.profile.section.ramps`,
-    summed over the corners.
+def count_blocks(u, v, low_u, low_v, block, count):
+    """Adds the points of each square block to count (b + 2, b + 2), whose border takes what lies outside.
 
     Args:
-        v, turn: (s, g, 4) places [m] and changes of slope of the corners.  x: (g, w) [m].
-        wide: (s, g) of the wider box [m].  share: (s,) of it that the narrower one has.
-        changed, moved: (p, s, g, 4) how the turns change with p unknowns; the turns times how their corners move.
-        depth: (s, g, w).  jacobian: (s, p + 2, g, w), the last two for the boxes' width and their share.
+        u, v: (n,).  low_u, low_v: where the blocks begin.  block: their side.
     """
-    unknowns = len(changed)
-    for s in range(v.shape[0]):
-        for g in range(v.shape[1]):
-            width, part = wide[s, g], share[s]
-            narrow = part * width
-            outer, inner = (width + narrow) / 2, (width - narrow) / 2
-            scale = 1.0 / (width * narrow)
-            for c in range(v.shape[2]):
-                bend = turn[s, g, c]
-                for k in range(x.shape[1]):
-                    y = v[s, g, c] - x[g, k]
-                    a, b = max(y + outer, 0.0), max(y + inner, 0.0)
-                    e, f = max(y - inner, 0.0), max(y - outer, 0.0)
-                    aa, bb, ee, ff = a * a, b * b, e * e, f * f
-                    ramp = (a * aa - b * bb - e * ee + f * ff) * (scale / 6)
-                    slope = (aa - bb - ee + ff) * (scale / 2)
-                    over, under = (aa - ff) * (scale / 4), (bb - ee) * (scale / 4)
-                    depth[s, g, k] += bend * ramp
-                    for p in range(unknowns):
-                        jacobian[s, p, g, k] += changed[p, s, g, c] * ramp + moved[p, s, g, c] * slope
-                    jacobian[s, unknowns, g, k] += bend * (over * (1 + part) - under * (1 - part) - 2 * ramp / width)
-                    jacobian[s, unknowns + 1, g, k] += bend * ((over + under) * width - ramp / part)
+    last = len(count) - 1
+    for i in range(len(u)):
+        a = min(max(int(np.floor((u[i] - low_u) / block)) + 1, 0), last)
+        b = min(max(int(np.floor((v[i] - low_v) / block)) + 1, 0), last)
+        count[a, b] += 1
+
+
+@_jit
+@no_type_check
+def sort_into_cells(u, v, height, front, cell, count, total):
+    """The flat index of each point's cell into cell (n,), -1 outside; and the number and heights of the points of each cell
+    added to count and total (h, w).
+
+    Args:
+        u, v: (n,) column and row, in cells.  height: (n,).  front: (n,) which points count.
+    """
+    rows, columns = count.shape
+    for i in range(len(u)):
+        column, row = np.floor(u[i]), np.floor(v[i])
+        if front[i] and 0 <= column < columns and 0 <= row < rows:
+            a, b = int(row), int(column)
+            cell[i] = a * columns + b
+            count[a, b] += 1.0
+            total[a, b] += height[i]
+        else:
+            cell[i] = -1

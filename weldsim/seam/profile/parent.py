@@ -91,7 +91,7 @@ def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float, reach: floa
         sigma=_height_sigma(s[good], x[good], residual[good]),
         step=step,
         angle=angle,
-        support=_support(s, x, good, m, rail.step, outer - inner),
+        support=_support(s, x, plate, m, rail.step, outer - inner),
         cells=np.stack([s[plate], x[plate]], axis=1),
     )
 
@@ -104,13 +104,17 @@ def _robust(
     fold: Int[ndarray, "k"],
 ) -> tuple[Float[ndarray, "p"], Float[ndarray, "k"], float]:
     """Coefficients, weights and scale [m] of the reweighted fit; the stiffness is chosen on the way."""
+    from weldsim.seam.profile import native
+
     stiffness, scale = STIFFNESSES[2], 0.003
     weight = np.ones(len(h))
     theta = np.zeros(design.shape[1])
+    held = np.empty((len(design), int(np.count_nonzero(design, axis=1).max(initial=0))), np.int64)
+    native.held_columns(design, held)
     for turn in range(8):
         if turn == 4:
-            stiffness = _choose_stiffness(design, h, weight, penalty, target, fold % 4)
-        theta = _solve(design, h, weight, stiffness * penalty, stiffness * target)
+            stiffness = _choose_stiffness(design, held, h, weight, penalty, target, fold % 4)
+        theta = _solve(design, held, h, weight, stiffness * penalty, stiffness * target)
         residual = h - design @ theta
         spread = 1.4826 * float(np.median(np.abs(residual)[weight > 0.05])) if (weight > 0.05).any() else scale
         scale = max(0.6 * scale, 1.5 * spread, 1e-5)
@@ -203,12 +207,13 @@ def _roughness(rail: Rail, knots: int) -> tuple[Float[ndarray, "p p"], Float[nda
 
 def _solve(
     design: Float[ndarray, "k p"],
+    held: Int[ndarray, "k c"],
     h: Float[ndarray, "k"],
     weight: Float[ndarray, "k"],
     penalty: Float[ndarray, "p p"],
     target: Float[ndarray, "p"],
 ) -> Float[ndarray, "p"]:
-    grams, rights = _normal_equations(design, h, weight)
+    grams, rights = _normal_equations(design, held, h, weight)
     gram, right = grams[0], rights[0]
     # Each unknown's own scale: a ridge as stiff as the penalty would hold down the curvature across the seam.
     ridge = np.diag(1e-9 * (np.diag(gram) + 1e-6))
@@ -216,20 +221,29 @@ def _solve(
 
 
 def _normal_equations(
-    design: Float[ndarray, "k p"], h: Float[ndarray, "k"], weight: Float[ndarray, "k"], part: Int[ndarray, "k"] | None = None
+    design: Float[ndarray, "k p"],
+    held: Int[ndarray, "k c"],
+    h: Float[ndarray, "k"],
+    weight: Float[ndarray, "k"],
+    part: Int[ndarray, "k"] | None = None,
 ) -> tuple[Float[ndarray, "q p p"], Float[ndarray, "q p"]]:
-    """Matrix and right side of weighted least squares, for each part of the rows, numbered from 0; None = one part."""
+    """Matrix and right side of weighted least squares, for each part of the rows, numbered from 0; None = one part.
+
+    Args:
+        held: the columns in which each row is not zero, then -1.
+    """
     from weldsim.seam.profile import native
 
     each = np.zeros(len(h), np.int64) if part is None else part
     parts, size = 1 if part is None else int(part.max(initial=0)) + 1, design.shape[1]
     gram, right = np.zeros((parts, size, size)), np.zeros((parts, size))
-    native.normal_equations(design, weight, h, each, gram, right)
+    native.normal_equations(design, held, weight, h, each, gram, right)
     return gram, right
 
 
 def _choose_stiffness(
     design: Float[ndarray, "k p"],
+    held: Int[ndarray, "k c"],
     h: Float[ndarray, "k"],
     weight: Float[ndarray, "k"],
     penalty: Float[ndarray, "p p"],
@@ -237,7 +251,7 @@ def _choose_stiffness(
     fold: Int[ndarray, "k"],
 ) -> float:
     """The stiffness that best predicts stretches left out."""
-    grams, rights = _normal_equations(design, h, weight, fold)
+    grams, rights = _normal_equations(design, held, h, weight, fold)
     whole, right = grams.sum(axis=0), rights.sum(axis=0)
     ridge = 1e-9 * (1 + np.trace(whole) / len(whole)) * np.eye(len(whole))
     errors = []

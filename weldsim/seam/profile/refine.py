@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
@@ -21,18 +22,18 @@ from weldsim.seam.profile.track import Track, between, follow, smoothed, track_d
 from weldsim.seam.profile.views import Blocks, agree
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
-LOOK_AHEAD = 0.040  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it
-END_VIEW = 0.035  # [m] beyond its ends that are measured at last: a plate's edge aslant across the groove shows on both sides
+LOOK_AHEAD = 0.035  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it, and a plate's edge aslant
+# across the groove shows on both sides. No farther: the points around a coarse line reach 42 mm from it
+AT_AN_END = 0.003  # [m] before the end of its rail a groove goes on, for all one can see
 MOST_LOOKS = 3
 BLOCK = 8  # stations averaged together for the cross-section fit
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
 FEWEST_CELLS = 40  # fewer do not fix a cross-section
 MOST_TURNS = 6
-LEVELLING = 2  # turns in which the rail, seen upright at first, is stood on the parent surface
-STEEP = 0.9  # [rad] that the two sides may differ before that
+STEEP = 0.9  # [rad] that the two sides may differ before the rail stands upright on the parent surface
 OTHER_VIEW = 0.08  # [rad] by which the sight turns from one block to the next only from view to view
 WIDEST_FOOTPRINT = 1.2  # of the camera's window on a surface seen at 35 deg, over one that faces it
-SETTLED = 2e-4  # [m] a rail that moves less than this is done
+SETTLED = (2e-4, 5e-4)  # [m] a rail that moves less than this is done: without noise, and where cells have as much or more
 BRIDGE = 0.015  # [m] a groove goes on across this without being seen
 NEAR_RAIL = 0.008  # [m] above and below a rail that lies on the parent surface; a clamp at the end of one is higher
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
@@ -92,16 +93,16 @@ def refine(
     every, every_origin = points, origins
     stride = max(1, len(points) // FIRST_LOOK)
     points, origins = points[::stride], None if origins is None else origins[::stride]
-    for turn in range(LEVELLING):
-        strip = lay_out(rail, points, origins)
-        parent = fit_parent(rail, strip, inner, outer)
-        # Sides are at an angle, too, that are bent and seen from a slant; that is told when the rail stands upright.
-        level = sided(parent, config) if turn == LEVELLING - 1 else sided(parent, config, most=STEEP)
-        if np.count_nonzero(level) * rail.step < 0.7 * config.min_length:
-            return None
-        rail = shift_rail(rail, np.zeros(len(rail)), parent.a, parent.b)
     strip = lay_out(rail, points, origins)
     parent = fit_parent(rail, strip, inner, outer)
+    # Sides are at an angle, too, that are bent and seen from a slant; that is told when the rail stands upright.
+    if np.count_nonzero(sided(parent, config, most=STEEP)) * rail.step < 0.7 * config.min_length:
+        return None
+    rail = shift_rail(rail, np.zeros(len(rail)), parent.a, parent.b)
+    strip = lay_out(rail, points, origins)
+    parent = fit_parent(rail, strip, inner, outer)
+    if np.count_nonzero(sided(parent, config)) * rail.step < 0.7 * config.min_length:
+        return None
     guess = _first_section(make_grid(rail, strip, parent, outer), sided(parent, config), attached(parent))
     if guess is None:
         return None
@@ -141,20 +142,19 @@ def _settled(
         measured = _at_rest(measured, points, origins, config, bridge)
         if measured is None:
             return None
-        farther = _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, points, origins, config)
-        if farther is None or farther.reach(bridge) <= measured.reach(bridge) + FEWEST_STATIONS:
+        before = measured
+        measured = _measure(_next_rail(before, bridge, LOOK_AHEAD), before.section, points, origins, config, "settled")
+        if measured is None:
+            return _concluded(before, bridge)
+        if measured.reach(bridge) <= before.reach(bridge) + FEWEST_STATIONS:
+            break
+    for _ in range(MOST_LOOKS - 1):
+        if not measured.goes_on(bridge, 0.3 * LOOK_AHEAD):
+            break
+        farther = _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, points, origins, config, "settled")
+        if farther is None:
             break
         measured = farther
-    if measured is None:
-        return None
-    for _ in range(MOST_LOOKS):
-        settled = _measure(_next_rail(measured, bridge, END_VIEW), measured.section, points, origins, config, "settled")
-        if settled is None:
-            break
-        measured = settled
-        core = pieces(measured.track.weight > 0, measured.rail.step, bridge)[0]
-        if min(core.start, len(measured.rail) - core.stop) * measured.rail.step > 0.3 * END_VIEW:
-            break
     return _concluded(measured, bridge)
 
 
@@ -170,8 +170,9 @@ def _at_rest(
         if measured is None:
             return None
         before = measured
-        measured = _measure(_next_rail(before, bridge), before.section, points, origins, config)
-        if measured is not None and measured.moved < SETTLED and measured.reach(bridge) <= before.reach(bridge) + 2:
+        extend = LOOK_AHEAD if before.goes_on(bridge) else EXTEND
+        measured = _measure(_next_rail(before, bridge, extend), before.section, points, origins, config)
+        if measured is not None and measured.settled and measured.reach(bridge) <= before.reach(bridge) + 2:
             break
     return measured
 
@@ -206,10 +207,20 @@ class Measurement:
         """How far the groove lies from the rail at most [m]."""
         return float(np.abs(self.offset[self.track.weight > 0]).max())
 
+    @property
+    def settled(self) -> bool:
+        """Whether it moves by no more than noise may move it: what is left, one step along the section mends."""
+        return self.moved < min(max(self.parent.noise, SETTLED[0]), SETTLED[1])
+
     def reach(self, bridge: float) -> int:
         """Stations in the longest piece seen, gaps up to `bridge` [m] bridged."""
         core = pieces(self.track.weight > 0, self.rail.step, bridge)[0]
         return core.stop - core.start
+
+    def goes_on(self, bridge: float, margin: float = AT_AN_END) -> bool:
+        """Whether the longest piece seen ends no more than `margin` [m] before an end of the rail."""
+        core = pieces(self.track.weight > 0, self.rail.step, bridge)[0]
+        return min(core.start, len(self.rail) - core.stop) * self.rail.step <= margin
 
 
 def _measure(
@@ -233,7 +244,7 @@ def _measure(
         # A camera's noise outweighs where its points lie in the cells; only without it do cells' places tell walls from blur.
         grid = grid.centred()
     section, doubt = _fit_grid(grid, flanked, parent.noise, start, stage)
-    track = follow(grid, section, flanked, attached(parent))
+    track = follow(grid, section, flanked, attached(parent), generalised=stage == "settled")
     section = replace(section, middle=0.0)
     if np.count_nonzero(track.weight) < FEWEST_STATIONS:
         return None
@@ -315,8 +326,7 @@ def _first_section(
 ) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
     """A first guess: each station's centroid, smoothed, and the mean profile's width and depth."""
     filled = np.maximum(grid.filled(), 0.0)
-    kernel = np.ones(9) / 9
-    smoothed = np.apply_along_axis(lambda column: np.convolve(column, kernel, mode="same"), 0, filled)
+    smoothed = _evened(filled)
     middle = np.abs(grid.x) < 0.016
     if np.count_nonzero(flanked) < 12:
         return None
@@ -334,11 +344,16 @@ def _first_section(
     centroid = np.where(seen, (window @ grid.x) / np.maximum(mass, 1e-12), 0.0)
     offset = smooth(centroid[:, None], seen.astype(float), 1e4)[:, 0]
     shifted = np.stack([np.interp(grid.x, grid.x - o, row) for o, row in zip(offset[seen], filled[seen], strict=True)])
-    mean = np.median(np.apply_along_axis(lambda column: np.convolve(column, kernel, mode="same"), 0, shifted), axis=0)
+    mean = np.median(_evened(shifted), axis=0)
     depth = max(float(mean[middle].max()), 1e-4)
     width = float(np.count_nonzero(mean[middle] > 0.5 * depth) * (grid.x[1] - grid.x[0]))
     section = Section(middle=0.0, width=1.4 * width, depth=1.15 * depth, floor=0.1, lean=0.0, blur=0.003)
     return section, offset, seen
+
+
+def _evened(image: Float[ndarray, "m w"]) -> Float[ndarray, "m w"]:
+    """The mean over each station and the four on either side; beyond the ends there is nothing."""
+    return cv2.boxFilter(image, -1, (1, 9), borderType=cv2.BORDER_CONSTANT)
 
 
 def _from_one_place(sight: Float[ndarray, "b 3"], candidates: Bool[ndarray, "b"]) -> Bool[ndarray, "b"]:

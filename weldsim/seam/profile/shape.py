@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from weldsim.seam.profile.section import NARROWEST, SHARPEST, Section, footprint, turns, vertices
+from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.views import Views
 
 # Unknowns: middle, width, depth [m]; floor; lean over the most that leaves no wall overhanging; blur [m]; taper.
@@ -63,74 +63,34 @@ def twin(theta: Float[ndarray, "*s 7"]) -> Float[ndarray, "*s 7"]:
 def predict(
     theta: Float[ndarray, "s 7"], step: float, x: Float[ndarray, "g w"], shear: Float[ndarray, "g"]
 ) -> tuple[Float[ndarray, "s g w"], Float[ndarray, "s 7 g w"]]:
-    """Depths [m] at lateral places x [m] under each shear, and their Jacobian in UNITs.
+    """Depths [m] at lateral places x [m] under each shear, and their Jacobian in UNITs."""
+    from weldsim.seam.profile import native_section
 
-    Blurring is linear, so only the corners are differentiated by differences; what follows from them is exact.
-    """
-    from weldsim.seam.profile import native
-
-    s = len(theta)
-    moves = np.concatenate([np.zeros((1, 7)), DELTA * np.diag(UNIT)[:BLUR]])
-    v, d = vertices(_corners((theta + moves[:, None]).reshape(-1, 7), step), shear)
-    kinks = turns(v, d)
-    v, kinks = v.reshape(BLUR + 1, s, *v.shape[1:]), kinks.reshape(BLUR + 1, s, *kinks.shape[1:])
-    stretch = footprint(shear)
-    wide, share = np.maximum(theta[:, BLUR, None] * stretch, SHARPEST), np.maximum(theta[:, TAPER], NARROWEST)
-    # For each corner: its turn, how that changes with the unknowns, and its turn times how it moves.
-    turn, changed = kinks[0], (kinks[1:] - kinks[0]) / DELTA
-    moved = turn * (v[1:] - v[0]) / DELTA
-    depth = np.repeat(d.reshape(BLUR + 1, s, *d.shape[1:])[0, ..., :1], x.shape[1], axis=2)
-    jacobian = np.zeros((s, 7, *depth.shape[1:]))
-    native.blurred(v[0], x, wide, share, turn, changed, moved, depth, jacobian)
-    jacobian[:, BLUR] *= stretch[:, None] * UNIT[BLUR]
-    jacobian[:, TAPER] *= UNIT[TAPER]
+    depth, jacobian = np.empty((len(theta), *x.shape)), np.empty((len(theta), 7, *x.shape))
+    for each, some, slopes in zip(theta, depth, jacobian, strict=True):
+        native_section.predict(each, step, x, shear, some, slopes)
     return depth, jacobian
 
 
-def _corners(theta: Float[ndarray, "s 7"], step: float) -> Float[ndarray, "s 6"]:
-    middle, width, depth, floor, lean = theta.T[:BLUR]
-    return np.stack([middle, width, depth, floor, lean * (1 - floor) * width / 2, np.full_like(middle, step)], axis=1)
-
-
-def terms(theta: Float[ndarray, "s 7"], views: Views, step: float) -> tuple[Float[ndarray, "s k"], Float[ndarray, "s 7 k"]]:
+def terms(theta: Float[ndarray, "7"], views: Views, step: float) -> tuple[Float[ndarray, "k"], Float[ndarray, "7 k"]]:
     """Whitened residuals and their Jacobian in UNITs, those of the priors last."""
-    depth, jacobian = predict(theta, step, views.at, views.shear)
-    root, s = np.sqrt(views.weight), len(theta)
-    w = views.depth.shape[1]  # one product of tall matrices costs less than many of small ones
-    data = (((depth - views.depth) * root).reshape(-1, w) @ views.white.T).reshape(s, -1)
-    slopes = ((jacobian * root).reshape(-1, w) @ views.white.T).reshape(s, 7, -1)
-    slender = np.log(theta[:, 2] / theta[:, 1] / SLENDER_PRIOR[0]) / SLENDER_PRIOR[1]
-    prior = np.stack([theta[:, 3] / FLOOR_PRIOR, slender, (theta[:, TAPER] - TAPER_PRIOR[0]) / TAPER_PRIOR[1]], axis=1)
-    steep = np.zeros((s, 7, 3))
-    steep[:, 3, 0] = UNIT[3] / FLOOR_PRIOR
-    steep[:, 2, 1] = UNIT[2] / theta[:, 2] / SLENDER_PRIOR[1]
-    steep[:, 1, 1] = -UNIT[1] / theta[:, 1] / SLENDER_PRIOR[1]
-    steep[:, TAPER, 2] = UNIT[TAPER] / TAPER_PRIOR[1]
-    return np.concatenate([data, prior], axis=1), np.concatenate([slopes, steep], axis=2)
+    from weldsim.seam.profile import native_section
+
+    size = views.depth.size + native_section.PRIORS
+    residual, jacobian = np.empty(size), np.empty((7, size))
+    native_section.terms(theta, step, *_told(views), residual, jacobian)
+    return residual, jacobian
 
 
 def solve(theta: Float[ndarray, "s 7"], free: Bool[ndarray, "7"], views: Views, step: float, most: int = 15) -> list[Solution]:
-    """The best section near each start, by Levenberg and Marquardt's method within LOW and HIGH, all starts at once."""
-    theta = np.clip(theta, LOW, HIGH)
-    damping = np.full(len(theta), 1e-2)
-    residual, jacobian = terms(theta, views, step)
-    cost = 0.5 * (residual**2).sum(axis=1)
-    for _ in range(most):
-        gram = jacobian @ jacobian.transpose(0, 2, 1)
-        gradient = (jacobian @ residual[..., None])[..., 0]
-        held = ~free | ((theta <= LOW) & (gradient > 0)) | ((theta >= HIGH) & (gradient < 0))
-        gram[held[:, :, None] | held[:, None, :]] = 0.0
-        scale = np.einsum("spp->sp", gram)
-        system = gram + np.where(held, 1.0, damping[:, None] * scale + 1e-9)[:, :, None] * np.eye(7)
-        move = np.linalg.solve(system, np.where(held, 0.0, -gradient)[..., None])[..., 0]
-        trial = np.clip(theta + move * UNIT, LOW, HIGH)
-        new_residual, new_jacobian = terms(trial, views, step)
-        new_cost = 0.5 * (new_residual**2).sum(axis=1)
-        better = new_cost < cost
-        gain = np.where(better, cost - new_cost, 0.0)
-        theta[better], residual[better], jacobian[better] = trial[better], new_residual[better], new_jacobian[better]
-        cost = np.where(better, new_cost, cost)
-        damping = np.where(better, np.maximum(damping * 0.2, 1e-6), np.minimum(damping * 6, 1e6))
-        if (gain[better] < 1e-3 * (1 + 1e-2 * cost[better])).all() and (better | (damping > 10)).all():
-            break
+    """The best section near each start, by Levenberg and Marquardt's method within LOW and HIGH."""
+    from weldsim.seam.profile import native_section
+
+    theta, cost = np.clip(theta, LOW, HIGH), np.empty(len(theta))
+    native_section.solve(theta, free, step, *_told(views), most, cost)
     return [Solution(each, float(c), free) for each, c in zip(theta, cost, strict=True)]
+
+
+def _told(views: Views) -> tuple[ndarray, ...]:
+    """What the views tell, as the compiled fit takes it."""
+    return views.at, views.shear, views.depth, np.sqrt(views.weight), np.ascontiguousarray(views.white.T)

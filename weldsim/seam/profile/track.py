@@ -71,10 +71,12 @@ class Track:
         return _absence(self.amplitude[part], self.usual, self.spread, self.alike)
 
 
-def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]) -> Track:
+def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"], generalised: bool = True) -> Track:
     """Lateral position and amplitude at every station, by one Gauss-Newton step each on the fitted section.
 
     Args:
+        generalised: whether the noise's covariance across the groove is heeded in the lateral position: worth its time at last,
+            not while the rail is still on its way.
         flanked: (m,) stations with parent surface on both sides.  held: (m,) on one side at least: there a groove
             that is already under way is still followed, past a bolt beside it, say, at a tenth of the weight.
     """
@@ -103,7 +105,7 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     seen |= _dips(amplitude, seen, enough & flanked, grid.step, (usual, spread, alike))
     groove |= seen
     shift = np.where(enough, sd / np.maximum(ss, 1e-18), 0.0)
-    if np.count_nonzero(seen) >= FEWEST_ROWS * (2 * least + 1):
+    if generalised and np.count_nonzero(seen) >= FEWEST_ROWS * (2 * least + 1):
         shift, ss = _correlated_shift(grid, depth - model, slope, known, seen, shift, least)
     shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
     weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)

@@ -21,6 +21,7 @@ from weldsim.seam.profile.chart import Chart
 MAX_LINES = 16
 MOST_BRANCHES = 12  # of one valley that are traced
 LINE = 0.025  # [m] length over which a valley is averaged along itself
+STEEPEST = 100.0  # steeper slopes are counted as this
 MODE_REACH = 0.35  # slopes this far from a mode, either way, belong to it
 MODE_SHARE = 0.10  # of the cells that a slope must have to get a valley image of its own
 MOST_MODES = 3
@@ -150,11 +151,10 @@ def _slope_modes(slopes: Float[ndarray, "n 2"]) -> list[Float[ndarray, "2"]]:
     modes: list[Float[ndarray, "2"]] = []
     left = known
     while len(modes) < MOST_MODES and len(left) >= MODE_SHARE * len(known):
-        bins = np.floor(left / (MODE_REACH / 2)).astype(np.int64)
+        bins = np.floor(np.clip(left, -STEEPEST, STEEPEST) / (MODE_REACH / 2)).astype(np.int64)
         bins -= bins.min(axis=0)
         keys = bins[:, 0] * (int(bins[:, 1].max()) + 1) + bins[:, 1]
-        _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
-        centre = _median(left[which == count.argmax()])
+        centre = _median(left[keys == np.bincount(keys).argmax()])
         near = _alike(left, centre)
         if near.any():
             centre = _median(left[near])

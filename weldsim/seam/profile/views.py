@@ -43,7 +43,8 @@ class Views:
         shear: (g,).  depth, weight: (g, w) robust mean [m] and inverse variance [1/m^2], 0 where empty.
         at: (g, w) mean lateral place of the points behind each mean [m].
         of: (b,) view of each block.  each: (b, w) the part of each cell in that weight.
-        white: (w, w) maps cells over their deviation to independent numbers of unit variance.
+        white: (w, w) maps cells over their deviation to independent numbers of unit variance; (0, 0) where they are taken to
+            be that.
         quiet: whether the blocks agree to within QUIETEST.
     """
 
@@ -53,7 +54,7 @@ class Views:
     weight: Float[ndarray, "g w"]
     of: Int[ndarray, "b"]
     each: Float[ndarray, "b w"]
-    white: Float[ndarray, "w w"]
+    white: Float[ndarray, "q q"]
     quiet: bool
 
 
