@@ -77,9 +77,14 @@ def blurred(v, bend, wide, share, x):
 
 @_jit
 @no_type_check
-def image(middle, width, depth, floor, lean, step, blur, taper, x, shear, out, change):
+def image(shape, x, shear, out, change):
     """Apparent depth out (g, w) [m] of a section at x (w,) [m] under each shear (g,), and its change as the section moves to
-    the left (g, w)."""
+    the left (g, w).
+
+    Args:
+        shape: (8,) middle, width, depth [m], floor, lean, step, blur [m], taper.
+    """
+    middle, width, depth, floor, lean, step, blur, taper = shape
     v, bend = np.empty(4), np.empty(4)
     share = max(taper, NARROWEST)
     for g in range(len(shear)):

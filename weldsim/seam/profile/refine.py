@@ -138,24 +138,35 @@ def _settled(
     bridge: float,
 ) -> Fit | None:
     """The fit once the rail has come to rest, and no groove is seen farther ahead."""
+    last: Measurement | None = None
     for _ in range(MOST_LOOKS):
-        measured = _at_rest(measured, points, origins, config, bridge)
-        if measured is None:
+        before = _at_rest(measured, points, origins, config, bridge)
+        if before is None:
             return None
-        before = measured
-        measured = _measure(_next_rail(before, bridge, LOOK_AHEAD), before.section, points, origins, config, "settled")
+        measured = last = _farther(before, points, origins, config, bridge)
         if measured is None:
             return _concluded(before, bridge)
         if measured.reach(bridge) <= before.reach(bridge) + FEWEST_STATIONS:
             break
     for _ in range(MOST_LOOKS - 1):
-        if not measured.goes_on(bridge, 0.3 * LOOK_AHEAD):
+        if last is None or not last.goes_on(bridge, 0.3 * LOOK_AHEAD):
             break
-        farther = _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, points, origins, config, "settled")
-        if farther is None:
+        measured = _farther(last, points, origins, config, bridge)
+        if measured is None:
             break
-        measured = farther
-    return _concluded(measured, bridge)
+        last = measured
+    return None if last is None else _concluded(last, bridge)
+
+
+def _farther(
+    measured: "Measurement",
+    points: Float[ndarray, "n 3"],
+    origins: Float[ndarray, "n 3"] | None,
+    config: ProfileConfig,
+    bridge: float,
+) -> "Measurement | None":
+    """The last, most careful measurement, along a rail that looks ahead at both ends; None where hardly any groove is seen."""
+    return _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, points, origins, config, "settled")
 
 
 def _at_rest(

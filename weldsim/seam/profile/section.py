@@ -51,8 +51,8 @@ class Section:
         levels = 1 if high - low < 1e-4 else LEVELS
         table = np.linspace(low, high, levels)
         depth, change = np.empty((2, levels, len(x)))
-        shape = (self.middle, self.width, self.depth, self.floor, self.lean, self.step, self.blur, self.taper)
-        native_section.image(*map(float, shape), np.ascontiguousarray(x, dtype=float), table, depth, change)
+        shape = np.array([self.middle, self.width, self.depth, self.floor, self.lean, self.step, self.blur, self.taper])
+        native_section.image(shape, np.ascontiguousarray(x, dtype=float), table, depth, change)
         if levels == 1:
             return np.repeat(depth, len(shear), axis=0), np.repeat(change, len(shear), axis=0)
         place = (shear - low) / (high - low) * (levels - 1)

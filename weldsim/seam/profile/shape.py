@@ -91,6 +91,6 @@ def solve(theta: Float[ndarray, "s 7"], free: Bool[ndarray, "7"], views: Views, 
     return [Solution(each, float(c), free) for each, c in zip(theta, cost, strict=True)]
 
 
-def _told(views: Views) -> tuple[ndarray, ...]:
+def _told(views: Views) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
     """What the views tell, as the compiled fit takes it."""
     return views.at, views.shear, views.depth, np.sqrt(views.weight), np.ascontiguousarray(views.white.T)
