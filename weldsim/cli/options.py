@@ -1,6 +1,7 @@
 """Options that several commands share, and how they become a config. Imports nothing heavy: every `--help` reads this."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -19,6 +20,11 @@ SceneName = Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SCENE")]
 Method = Literal["profile", "thesis"]
 SCENE_PREFIX = "scene."
 EVERYTHING = ("twin", "sensor", "d435", "stereo", "kinect", "cloud", "scan", "seam", "path", "motion", "execution", "report")
+
+
+def parted(words: Sequence[str]) -> tuple[str, ...]:
+    """The words of a list, with those parted that were written with commas between them; a file's own name may hold one."""
+    return tuple(part for word in words for part in ([word] if Path(word).exists() else filter(None, word.split(","))))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, choose_platform
+from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, choose_platform, parted
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table
 from weldsim.errors import InputError
@@ -81,12 +81,12 @@ class Regress(ConfigOptions):
         self._check(path)
         golden = self._golden(path)
         config = self.cell()
-        scenes = [self.scene_of(name) for name in self.scenes] or None
+        scenes = [self.scene_of(name) for name in parted(self.scenes)] or None
         choose_platform()
         with progress() as tell:
             outcome = regress(
                 scenes,
-                methods=self.methods,
+                methods=parted(self.methods),
                 seeds=self.seeds,
                 seeds_of=dict.fromkeys(CHAOTIC, max(self.seeds, RECORDED_SEEDS)) if self.update else None,
                 jobs=self.jobs,
@@ -110,7 +110,7 @@ class Regress(ConfigOptions):
         from weldsim.regression.finders import told_apart
         from weldsim.regression.golden import is_packed
 
-        told_apart(self.methods, None)
+        told_apart(parted(self.methods), None)
         if self.update and not (self.reason or "").strip():
             raise InputError("--update: needs --reason, which is kept beside every figure that changes")
         if self.reason is not None and not self.update:

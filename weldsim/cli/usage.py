@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from itertools import groupby, pairwise
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 import tyro
 
@@ -237,10 +237,15 @@ def _command_for(word: str) -> str:
 def _check_options(name: str, command: Any, words: Sequence[str]) -> None:
     """Raises InputError for an option that the command does not have; one line that names the one meant."""
     known, positional, short = _options(command), _options(command, positional=True), _short(command)
+    lists, given = _lists(command), set()
     for index, word in enumerate(words):
         if word == "--":
             return
         option = word.lstrip("-").partition("=")[0].replace("_", "-")
+        if word.startswith("--") and option in lists:
+            if option in given:  # the last would silently take the place of the others
+                raise InputError(f"--{option} is given twice; give its values together: --{option} A B", words=[word])
+            given.add(option)
         if not word.startswith("-") or not option[:1].isalpha() or (word.startswith("--") and option in {*known, "help"}):
             continue
         if (not word.startswith("--") and word in short) or " " in word:
@@ -268,6 +273,13 @@ def _meant_options(option: str, known: Iterable[str]) -> list[str]:
 def _options(command: Any, *, positional: bool = False) -> set[str]:
     """Names of the options of a command, or of what it takes without a name."""
     return {_name(one) for one in fields(command) if (tyro.conf.Positional in _marks(one.type)) is positional}
+
+
+def _lists(command: Any) -> set[str]:
+    """Names of the options that take several words at once."""
+    alone = {tyro.conf.UseAppendAction, tyro.conf.Positional}
+    plain = {_name(one): getattr(one.type, "__origin__", None) for one in fields(command) if not alone & set(_marks(one.type))}
+    return {name for name, origin in plain.items() if origin is tuple or get_origin(origin) is tuple}
 
 
 def _name(field: Any) -> str:

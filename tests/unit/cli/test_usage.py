@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from weldsim.cli import main
+from weldsim.cli.options import parted
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.plan import Plan
 from weldsim.cli.run import Run
@@ -30,6 +31,7 @@ from weldsim.errors import InputError, OutputError, WeldsimError
         (["plan", "--set"], "--set"),
         (["scan", "straight", "--sensor", "eye\nglass"], "eye"),
         (["plan", "[bold]a[/bold]", "│ ── x"], "x"),
+        (["regress", "--scenes", "plain", "--scenes=y"], "--scenes is given twice; give its values together: --scenes A B"),
     ],
 )
 def test_usage_errors_are_one_line_and_exit_2(words, says, capsys):
@@ -63,6 +65,12 @@ def test_words_become_options():
     config = command.cell(None)
     assert (config.path.speed, config.seam.method) == (0.01, "thesis")
     assert command.cell("profile").seam.method == "profile"
+
+
+def test_a_list_may_be_written_with_commas(tmp_path):
+    own = tmp_path / "a,b.toml"
+    own.touch()
+    assert parted(("plain,y", "curve,", str(own))) == ("plain", "y", "curve", str(own))
 
 
 def test_settings_of_the_scene_start_with_scene():

@@ -10,7 +10,7 @@ from weldsim.records import PointCloud
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.background import Standing
 from weldsim.seam.profile.find import find_seams_profile
-from weldsim.seam.profile.judge import DOUBTFUL, FOUND, doubt
+from weldsim.seam.profile.judge import DOUBTFUL, FOUND, MOST_LAPSES, doubt, most_lapses
 from weldsim.sensor.noise import NoiseField, disparity_noise
 
 CONFIG = ProfileConfig()
@@ -74,6 +74,13 @@ def test_pieces_of_one_seam_stand_out_together() -> None:
     assert doubt([one]) is not None
     assert doubt([one, one]) is None
     assert doubt([None]) is not None, "what no chart shows is no groove"
+
+
+def test_short_grooves_may_hardly_fade_on_the_way() -> None:
+    """Two holes 30 mm apart, looked at over 25 mm, are one groove of 50 mm whose depth is absent over a seventh of it."""
+    assert most_lapses(0.05, 0.025) < 1 / 14
+    assert most_lapses(0.05, 0.007) == most_lapses(0.24, 0.025) == MOST_LAPSES
+    assert most_lapses(0.02, 0.025) == 0
 
 
 def test_few_looks_are_believed_less() -> None:

@@ -12,6 +12,7 @@ from weldsim.seam.profile.refine import BRIDGE, Fit
 MISFIT_LIMIT = 0.75
 MIN_SUPPORT = 0.5
 MOST_LAPSES = 0.18
+FORGIVEN = 4.0  # looks more than one, from which on so many are allowed
 LOOKS = 2.0  # looks at the depth, that a groove is longer than: a hole is drawn out to one, and by its own length
 FOUND = 6.0  # score of a `Standing`, from which on it is a groove; waves of bare tables, real and simulated, reach 4.6
 CLEAR = 6.0  # score at which 37 % of the doubt is left
@@ -38,7 +39,7 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: b
         (_shown_depth(fit) < config.min_depth, f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {config.min_depth * 1e3:.2f} mm"),
         (fit.track.misfit > MISFIT_LIMIT, f"cross-sections fit a groove poorly ({fit.track.misfit:.2f}, limit {MISFIT_LIMIT})"),
         (
-            _lapses(fit, span) > MOST_LAPSES,
+            _lapses(fit, span) > most_lapses(length, look),
             f"depth comes and goes, absent over {_lapses(fit, span):.0%} of it: a row of holes, or noise",
         ),
         (support < MIN_SUPPORT, f"parent surface on both sides over {support:.0%} of it, under {MIN_SUPPORT:.0%}"),
@@ -73,6 +74,16 @@ def confidence(fit: Fit, span: tuple[float, float], config: ProfileConfig, stand
     explained = max(0.0, 1.0 - fit.track.misfit**2)
     clear = 1.0 - float(np.exp(-((score([stands]) / CLEAR) ** 2)))
     return float(np.clip(supported(fit, span, config) * explained * clear, 0.0, 1.0))
+
+
+def most_lapses(length: float, look: float) -> float:
+    """Fraction of its stations at which the depth of a groove may be absent: none of two looks, where two holes may seem one
+    groove; of many, as much as noise hides.
+
+    Args:
+        length: of the groove, look: of the stretch over which its depth is averaged [m].
+    """
+    return MOST_LAPSES * min(1.0, max(length / look - 1.0, 0.0) / FORGIVEN)
 
 
 def _shown_depth(fit: Fit) -> float:
