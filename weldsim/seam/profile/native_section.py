@@ -29,7 +29,7 @@ PRIORS = 3  # residuals of floor, slenderness and taper, after those of the data
 UNKNOWNS = 7
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e6
 STUCK = 10.0  # a damping under which a step that gains nothing says that there is nothing to gain
-SMALL_GAIN = (1e-3, 1e-2)  # of the cost: absolute, and over the cost
+SMALL_GAIN = (1e-8, 1e-2)  # of the cost: absolute, and over the cost
 
 
 @_jit

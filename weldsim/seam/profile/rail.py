@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 from weldsim.curves import arc_length, interpolate, tangents
 from weldsim.frames import unit
 
+ROUNDING = 1e-3  # of a step that a rail may lack to hold another station: most are a whole number of steps long
 SHARPEST = 1 / 0.20  # [1/m] the curvature with which a rail is carried on at most: an end is known from one side only
 
 
@@ -61,7 +62,7 @@ def make_rail(points: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], ste
         points = np.concatenate([head, points, tail])
         normals = np.concatenate([np.repeat(normals[:1], len(head), 0), normals, np.repeat(normals[-1:], len(tail), 0)])
     s = arc_length(points)
-    at = np.arange(0.0, s[-1] + 1e-9, step)
+    at = np.arange(0.0, s[-1] + ROUNDING * step, step)
     even = interpolate(s, points, at)
     return _with_axes(even, interpolate(s, normals, at), step)
 
