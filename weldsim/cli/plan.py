@@ -45,7 +45,7 @@ class Plan(ConfigOptions):
     """Camera of a depth image: JSON, TOML or `key: value` lines."""
 
     pose: Path | None = None
-    """Pose of that camera in the base, JSON; by default the base is where the camera is."""
+    """Pose of that camera in the base: JSON, TOML or YAML, or a 4x4 matrix; by default the base is where the camera is."""
 
     depth_unit: Annotated[float | None, quantity(COUNT, "--depth-unit")] = None
     """Length of one count of a depth image, "1 mm" by default."""

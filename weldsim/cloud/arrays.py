@@ -13,7 +13,10 @@ from numpy.lib import format as npy
 
 from weldsim.cloud.raw import MAX_POINTS, RawCloud, Unreadable, check_count, from_columns, unit_colours
 
-_POINTS = ("points", "xyz", "pcd", "cloud", "vertices", "pts", "pc", "arr_0")
+_POINTS = (
+    "points", "xyz", "pcd", "cloud", "vertices", "pts", "pc", "arr_0", "pointcloud", "point_cloud", "positions", "coords", "verts",
+    "points_xyz", "xyz_points", "points3d",
+)  # fmt: skip
 _NORMALS = ("normals", "normal")
 _COLOURS = ("colours", "colors", "rgb", "colour", "color")
 _MAX_BYTES = MAX_POINTS * 24
@@ -74,8 +77,14 @@ def read_array_cloud(data: bytes) -> RawCloud:
     """
     if data[:2] != b"PK":
         return _cloud(read_npy(data), {})
-    arrays = read_npz(data)
+    arrays = {name.lower(): read for name, read in read_npz(data).items()}
     key = next((name for name in _POINTS if name in arrays), None)
+    if key is None and all(name in arrays for name in "xyz"):
+        axes = {name: _numbers(arrays[name]()).ravel() for name in "xyz"}
+        if len({len(values) for values in axes.values()}) > 1:
+            raise Unreadable(f"its arrays x, y and z have {', '.join(str(len(values)) for values in axes.values())} numbers")
+        check_count(len(axes["x"]))
+        return from_columns(axes)
     if key is None and len(arrays) == 1:
         key = next(iter(arrays))
     if key is None:
@@ -124,9 +133,14 @@ def _cloud(array: ndarray, arrays: dict[str, Callable[[], ndarray]]) -> RawCloud
         flat = array.reshape(-1)
         check_count(len(flat))
         return from_columns({name.lower(): flat[name] for name in array.dtype.names if _is_column(flat[name])})
+    if array.ndim in (2, 3) and array.shape[0] == 3 and array.shape[-1] > 64:  # axis by axis
+        array = np.moveaxis(array, 0, -1)
     if array.ndim < 2 or array.shape[-1] < 3 or array.shape[-1] > 64:
-        image = "; a depth image needs its intrinsics beside it (--intrinsics)" if array.ndim == 2 and min(array.shape) > 3 else ""
-        raise Unreadable(f"its array has shape {array.shape}; points are (n, 3){image}")
+        image = "; a depth image needs its intrinsics beside it (--intrinsics)" if array.ndim == 2 and min(array.shape) > 16 else ""
+        turned = ": save its transpose" if array.ndim == 2 and 3 < array.shape[0] <= 16 else ""
+        raise Unreadable(f"its array has shape {array.shape}; points are (n, 3){turned}{image}")
+    if array.dtype == np.float16:
+        raise Unreadable("its numbers have half precision, 0.5 mm apart at 0.6 m: save singles or doubles")
     points = _numbers(array.reshape(-1, array.shape[-1])[:, :3])
     check_count(len(points))
 

@@ -2,8 +2,8 @@
 
 Intrinsics are width, height, fx, fy, cx, cy (or ppx, ppy), or a 3x3 `K` with width and height, and the coefficients of the
 lens, as JSON, TOML or `key: value` lines (see `weldsim.cloud.camera_files`).
-A `depth_scale` there [m per count] outranks the caller's. A pose is JSON: `position` [m] and `quaternion_wxyz`, or a 4x4
-`matrix`, of the optical frame in the robot base.
+A `depth_scale` there [m per count] outranks the caller's. A pose is that of the optical frame in the robot base (see
+`weldsim.cloud.pose_files`).
 """
 
 import zlib
@@ -18,9 +18,10 @@ from weldsim.cloud.arrays import read_npy, read_npz
 from weldsim.cloud.camera_files import numbers, read_camera
 from weldsim.cloud.extent import FARTHEST_CAMERA, meant_metres
 from weldsim.cloud.key_values import read_table
+from weldsim.cloud.pose_files import read_pose
 from weldsim.cloud.raw import Unreadable
 from weldsim.cloud.sources import read_bytes
-from weldsim.errors import CloudFileError, RecordError, WeldsimError
+from weldsim.errors import CloudFileError, RecordError
 from weldsim.frames import Transform
 from weldsim.output import write_whole
 from weldsim.records import CameraIntrinsics, DepthFrame
@@ -80,24 +81,6 @@ def _check_lens(camera: CameraIntrinsics, depth: Float32[ndarray, "h w"], path: 
         row, column = np.argwhere(lost)[0]
         reason = f"its lens coefficients fold the image over at pixel ({column}, {row}); check their order (k1 k2 p1 p2 k3)"
         raise CloudFileError(f"{path}: {reason}", path=path, reason=reason)
-
-
-def read_pose(path: str | Path) -> Transform:
-    """X_BC from a JSON file. Raises CloudFileError."""
-    table = read_table(path)
-    try:
-        if "position" in table:
-            quaternion, p = numbers(table, "quaternion_wxyz", (4,)), numbers(table, "position", (3,))
-            if abs(np.linalg.norm(quaternion) - 1.0) > 0.01:
-                raise Unreadable(f"its quaternion_wxyz has length {np.linalg.norm(quaternion):.3g}, not 1")
-            return Transform.from_quaternion("BC", quaternion, p)
-        matrix = numbers(table, "matrix", (4, 4))
-        u, _, vt = np.linalg.svd(matrix[:3, :3])
-        if np.abs(u @ vt - matrix[:3, :3]).max() > 1e-3 or np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
-            raise Unreadable("its matrix is no rigid transform")
-        return Transform("BC", u @ vt, matrix[:3, 3])  # printed digits are no exact rotation
-    except (Unreadable, WeldsimError) as error:
-        raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
 
 
 def write_depth_png(path: str | Path, depth: Float32[ndarray, "h w"], *, depth_unit: float = 1e-3) -> Path:

@@ -41,10 +41,10 @@ def check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: i
     """Raises CloudError when the extent shows that the unit is wrong, or that the cloud must be cropped.
 
     Args:
-        points: (n, 3) [m], read in `unit`.  dropped: points that were not finite.  raw: what the file said of itself.
+        points: (n, 3) [m], read in `unit`.  dropped: points that were not finite, or zero.  raw: what the file said of itself.
     """
     span = float(np.ptp(points, axis=0).max())
-    left_out = f" ({dropped} points that are not finite left out)" if dropped else ""
+    left_out = f" ({dropped} points that are not finite, or zero, left out)" if dropped else ""
     if span > MILLIMETRE_SPAN:
         advice = _too_wide(points, unit, span, raw)
         raise CloudError(

@@ -23,6 +23,7 @@ from weldsim.cloud.ptx import is_ptx, read_ptx
 from weldsim.cloud.raw import RawCloud, Unreadable
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
+from weldsim.columns import decode
 from weldsim.errors import CloudError, CloudFileError, OutputError
 from weldsim.output import write_whole
 from weldsim.records import PointCloud
@@ -43,7 +44,8 @@ def read_cloud(
     viewpoint: Sequence[float] | ndarray | None = None,
     crop: tuple[Sequence[float], Sequence[float]] | None = None,
 ) -> PointCloud:
-    """The cloud in a file, in metres, expressed in the robot base; points that are not finite are dropped.
+    """The cloud in a file, in metres, expressed in the robot base; points that are not finite are dropped, and
+    those at 0 0 0 where several are.
 
     Args:
         path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, told apart by content.
@@ -55,6 +57,8 @@ def read_cloud(
         CloudError: no finite point, coordinates too coarse, an extent that shows that `unit` is wrong, or a camera too far away.
     """
     data = read_bytes(path)
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):  # UTF-16, as spreadsheets save text
+        data = decode(data).encode()
     try:
         with np.errstate(all="ignore"):  # signalling NaNs and the like are dropped below
             raw = _reader(data)(data)
@@ -64,10 +68,10 @@ def read_cloud(
     if raw.unit is not None and said != raw.unit:
         raise CloudError(f"{path}: --units {said}, but its columns are named in {raw.unit}; leave --units out", path=str(path))
     scale = METRES[said]
-    keep = _finite_rows(raw.points)
+    keep = _seen(raw.points)
     total, dropped = len(keep), int((~keep).sum())
     if dropped == total:
-        raise CloudError(f"{path}: none of its {total} points is finite", path=str(path), total=total)
+        raise CloudError(f"{path}: none of its {total} points is finite and not zero", path=str(path), total=total)
     with np.errstate(over="ignore", invalid="ignore"):
         check_grain(str(path), raw.points[keep] if dropped else raw.points, scale)
         if crop is not None:
@@ -101,8 +105,6 @@ def _reader(data: bytes) -> Callable[[bytes], RawCloud]:
     for magic, name in _OTHERS.items():
         if data.startswith(magic):
             raise Unreadable(f"it is {name}; export the cloud as PLY, PCD or XYZ text")
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise Unreadable("it is UTF-16 text; save it as UTF-8")
     head = data[:4096]
     if head.startswith((b"# .PCD", b"VERSION")) or (b"\nFIELDS" in head and b"\nSIZE" in head):
         return read_pcd
@@ -116,10 +118,13 @@ def _read_obj(data: bytes) -> RawCloud:
     return read_text(b"\n".join(re.findall(rb"^v[ \t]+([^\n]*)", data, re.MULTILINE)))
 
 
-def _finite_rows(points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
-    """Which points are finite."""
+def _seen(points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
+    """Which points are finite, without the origin where several lie there: cameras write 0 0 0 for a pixel that saw nothing."""
     x, y, z = np.isfinite(points).T
-    return x & y & z
+    finite = x & y & z
+    x, y, z = (points == 0).T
+    blind = x & y & z
+    return finite & ~blind if np.count_nonzero(blind) > 1 else finite
 
 
 def _unit_normals(normals: Float[ndarray, "n 3"] | None, keep: Bool[ndarray, "n"]) -> Float[ndarray, "m 3"] | None:

@@ -76,7 +76,8 @@ def _whole_lines(text: str) -> list[str]:
     """Lines, a list in brackets that goes over several joined to one."""
     lines: list[str] = []
     for line in text.split("\n"):
-        if lines and lines[-1].count("[") > lines[-1].count("]"):
+        starts = line.lstrip().startswith("[") and bool(lines) and lines[-1].rstrip().endswith(":")
+        if starts or (lines and lines[-1].count("[") > lines[-1].count("]")):
             lines[-1] += " " + line.strip()
         else:
             lines.append(line)
@@ -90,6 +91,9 @@ def _value(text: str) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError):
         pass
+    if text[:1] + text[-1:] == "{}" and ":" in text:
+        pairs = [part.partition(":") for part in text[1:-1].split(",")]
+        return {key.strip().strip("\"'"): _value(value) for key, _, value in pairs}
     inside = text[1:-1] if text[:1] + text[-1:] in ("[]", "()", "{}") else text
     pointed = [word.replace(",", ".") if _COMMA_NUMBER.fullmatch(word) else word for word in inside.split()]
     numbers = pointed if all(map(is_number, pointed)) else [word for word in re.split(r"[,\s]+", inside) if word]

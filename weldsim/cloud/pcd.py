@@ -22,7 +22,7 @@ def read_pcd(data: bytes) -> RawCloud:
     row = _row(header)
     count = _count(header)
     check_count(count)
-    match header["DATA"]:
+    match [word.lower() for word in header["DATA"]]:
         case ["ascii"]:
             fields = _ascii(data[start:], row, count)
         case ["binary"]:
@@ -48,7 +48,7 @@ def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
             raise Unreadable("its PCD header does not end")
         words = data[start:end].decode("latin1").split("#")[0].split()
         if words:
-            header[words[0].upper()] = words[1:]
+            header["FIELDS" if words[0].upper() == "COLUMNS" else words[0].upper()] = words[1:]
         start = end + 1
     missing = [key for key in ("FIELDS", "SIZE", "TYPE") if key not in header]
     if missing:

@@ -19,6 +19,8 @@ _TYPES = {
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _MAX_HEADER = 65_536
+_VERTICES = ("vertex", "vertices", "point", "points")
+_VIEW = ("view_px", "view_py", "view_pz")
 
 
 @dataclass
@@ -49,17 +51,32 @@ def read_ply(data: bytes) -> RawCloud:
                 f"its header promises {element.count} x {element.name}, at least {promised} bytes, but {left} follow: cut off?"
             )
     names = [element.name for element in elements]
-    if "vertex" not in names:
+    name = next((name for name in _VERTICES if name in names), None)
+    if name is None:
         raise Unreadable(f"its header has no vertex element ({', '.join(names) or 'none at all'})")
-    before, vertex = elements[: names.index("vertex")], elements[names.index("vertex")]
+    at = names.index(name)
+    before, vertex = elements[:at], elements[at]
     check_count(vertex.count)
     if vertex.has_list:
         raise Unreadable("its vertices hold a list property, which has no fixed size")
     labels = [entry[0] for entry in vertex.properties]
     if len(set(labels)) != len(labels):
         raise Unreadable("two of its vertex properties have the same name")
+    if order == "ascii" and b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
     read = _ascii_columns if order == "ascii" else _binary_columns
-    return from_columns(read(data, start, before, vertex, order), viewpoints=viewpoints)
+    columns = read(data, start, before, vertex, order)
+    if viewpoints is None and elements[at + 1 :] and elements[at + 1].name == "camera" and not elements[at + 1].has_list:
+        viewpoints = _camera(read(data, start, [*before, vertex], elements[at + 1], order))
+    return from_columns(columns, viewpoints=viewpoints)
+
+
+def _camera(columns: dict[str, ndarray]) -> Float[ndarray, "1 3"] | None:
+    """Where the camera stood, as PCL writes it after the points; its default, the origin, says nothing."""
+    if not all(name in columns and len(columns[name]) == 1 for name in _VIEW):
+        return None
+    place = np.array([[float(columns[name][0]) for name in _VIEW]])
+    return place if np.isfinite(place).all() and place.any() else None
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | None, int]:

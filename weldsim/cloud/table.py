@@ -13,6 +13,14 @@ from weldsim.cloud.raw import COLOURS, NORMALS, XYZ, RawCloud, Unreadable, check
 from weldsim.columns import HEADER_LINES, SAMPLE, UNITS, TextTable, by_role, counts, decode, find_table, is_number
 
 _HEAD = 1 << 20  # bytes in which the first row is looked for
+_DIGITS = b"0123456789+-.eE,; \t\r\n"
+_NO_NUMBER = re.compile(
+    rb"[-+]?(?:1\.#(?:QNAN|SNAN|IND|INF)\d*|nan\(\w*\)|(?<![^\s,;])(?:#?n/?a|null|none)(?![^\s,;]))", re.IGNORECASE
+)
+_EMPTY = re.compile(rb"(?:(?<=[,;\t])|^)[ ]*(?=[,;\t])|(?<=[,;\t])[ ]*$", re.MULTILINE)
+_BRACKETED = re.compile(rb"(?:[^\n]*\n)?\s*[\[({|]*\s*[-+.\d][^\n]*[\])}|]")
+_BETWEEN = re.compile(rb"[\])}][ \t]*,?\s*[\[({]")
+_BRACKETS = bytes.maketrans(b"[](){}|", b" " * 7)
 _TAKEN = ("m", "cm", "mm", "in")  # units that read_cloud knows by these names
 
 
@@ -31,6 +39,7 @@ def parse_table(
     """
     if not text.strip():
         raise Unreadable("its header promises points, none follow")
+    text = plain_nans(text)
     if delimiter is None and b"," in text:  # decimal ones: white space parts
         text = text.replace(b",", b".")
     used = range(columns) if isinstance(columns, int) else columns
@@ -45,12 +54,19 @@ def parse_table(
     return table
 
 
+def plain_nans(data: bytes) -> bytes:
+    """The text with `nan` in place of other spellings of no number: Visual C++'s `-nan(ind)` and `1.#QNAN`, NA, null, none."""
+    letters = data.translate(None, _DIGITS)  # almost nothing: far quicker than to look through all of it
+    return _NO_NUMBER.sub(b"nan", data) if re.search(rb"nan\(|#|n/?a|null|non", letters, re.IGNORECASE) else data
+
+
 def read_text(data: bytes) -> RawCloud:
     """The points of a text file: x y z first on each line, or in the columns that a line above the first names so.
 
-    White space, comma or semicolon between; decimal commas where a comma is not what separates. Names are believed, and
-    their units. Six unnamed columns are colours when the last three are whole numbers up to 255, normals when they are
-    unit vectors; further columns are passed over, and a name of each point before them.
+    White space, comma or semicolon between, brackets around or not; decimal commas where a comma is not what separates. A
+    cell that is empty, or says that it is no number, is none. Names are believed, and their units. Six unnamed columns are
+    colours when the last three are whole numbers up to 255, normals when they are unit vectors; further columns are passed
+    over, and a name of each point before them.
 
     Raises:
         Unreadable: no line of three numbers at the beginning, names without x, y and z, or a later line that is no row.
@@ -60,8 +76,13 @@ def read_text(data: bytes) -> RawCloud:
         raise Unreadable("it is binary, and no PLY, PCD, NPZ or NPY")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = plain_nans(data)
     lines = _head(data)
     table = find_table(lines)
+    if table is None and _BRACKETED.match(data) is not None:  # as Python prints lists, or between bars
+        data = _BETWEEN.sub(b"\n", data).translate(_BRACKETS)
+        lines = _head(data)
+        table = find_table(lines)
     if table is None:
         raise Unreadable(f"it is no cloud: none of its first {HEADER_LINES} lines starts with three numbers")
     columns, units = _columns(table, lines[table.first : table.first + SAMPLE])
@@ -128,6 +149,8 @@ def _read(data: bytes, table: TextTable, columns: list[int]) -> Float[ndarray, "
     body = re.sub(_COMMENTS if table.delimiter != ";" else _COMMENTS_BUT_SEMICOLONS, b"#", data[start:])
     if b'"' in body:
         body = re.sub(rb'"([^"\n]*)"', lambda quoted: quoted[1].replace(b",", b"."), body)
+    if table.delimiter is not None and (table.delimiter * 2).encode() in body.replace(b" ", b""):
+        body = _EMPTY.sub(b"nan", body)
     if table.delimiter != "," and b"," in body and (table.decimal_comma or not re.search(rb"\d\.\d", body)):
         body = body.replace(b",", b".")
     try:

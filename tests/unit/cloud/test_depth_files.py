@@ -134,12 +134,12 @@ def test_what_is_no_depth_frame_is_refused_in_one_line(put, capfd, image: bytes,
 @pytest.mark.parametrize(
     ("pose", "words"),
     [
-        ({"position": [1, 2]}, "quaternion_wxyz"),
+        ({"position": [1, 2, 3]}, "no rotation (found: position); wanted: position and quaternion_wxyz"),
         ({"position": [1, 2], "quaternion_wxyz": [1, 0, 0, 0]}, "expected 3 finite"),
         ({"position": [1, 2, 3], "quaternion_wxyz": [2, 0, 0, 0]}, "length 2"),
         ({"matrix": (np.eye(4) * 2).tolist()}, "no rigid transform"),
-        ({"matrix": np.diag([1, 1, -1, 1]).tolist()}, "not a rotation"),
-        ({"pose": 3}, "key 'matrix' is missing"),
+        ({"matrix": np.diag([1, 1, -1, 1]).tolist()}, "left-handed"),
+        ({"pose": 3}, "no position (found: pose)"),
         ([], "matrix"),
     ],
 )

@@ -313,9 +313,6 @@ def test_packed_and_wide_text_are_named(tmp_path):
     (tmp_path / "a.ply.gz").write_bytes(gzip.compress(b"ply\n"))
     with pytest.raises(CloudFileError, match="unpack it first"):
         read_cloud(tmp_path / "a.ply.gz")
-    (tmp_path / "a.xyz").write_text("0.1 0.2 0.3\n" * 9, encoding="utf-16")
-    with pytest.raises(CloudFileError, match="UTF-8"):
-        read_cloud(tmp_path / "a.xyz")
     np.save(tmp_path / "depth.npy", np.full((96, 128), 0.4))
     with pytest.raises(CloudFileError, match="--intrinsics"):
         read_cloud(tmp_path / "depth.npy")
