@@ -19,6 +19,8 @@ UNITS = {
     "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "feet": 0.3048, "foot": 0.3048,
 }  # fmt: skip
 """Metres per unit of length, by the names that headers give it."""
+OTHER_UNITS = {"rad", "radian", "radians", "deg", "degree", "degrees", "\u00b0", "s", "sec", "ms", "m/s", "mm/s", "-", "1"}
+"""What a line of units may hold besides."""
 
 AXES, NORMALS, COLOURS = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
 _DELIMITERS = (";", "\t", ",", None)
@@ -266,7 +268,7 @@ def _names(above: Sequence[str], delimiter: str | None, width: int) -> tuple[Col
         comment = comment and not (delimiter == ";" and line.lstrip().startswith(";"))
         bare = _COMMENT.sub("", line, count=1).lstrip("#/%!*- ") if comment else line
         cells = _header_cells(bare, delimiter, width)
-        if cells and all(_unit(cell.strip("[]()")) in UNITS or not cell for cell in cells) and any(cells) and len(cells) == width:
+        if len(cells) == width and _are_units(cells):
             units = cells
             continue
         names = [read_name(cell) for cell in cells]
@@ -279,6 +281,12 @@ def _names(above: Sequence[str], delimiter: str | None, width: int) -> tuple[Col
         if not comment and not all(map(is_number, cells)):
             return None
     return None
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Whether cells are a line of units, a length among them."""
+    found = [_unit(cell.strip("[]()")) for cell in cells if cell]
+    return any(unit in UNITS for unit in found) and all(unit in UNITS or unit in OTHER_UNITS for unit in found)
 
 
 def _aligned(names: tuple[ColumnName, ...], rows: Sequence[str], delimiter: str | None, width: int) -> tuple[ColumnName, ...]:

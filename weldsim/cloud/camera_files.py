@@ -16,10 +16,14 @@ from weldsim.cloud.raw import Unreadable
 from weldsim.records import CameraIntrinsics
 
 MAX_SIDE = 16_384  # [px]
+SHORTEST = 0.1  # of an image's side: a shorter focal length sees over 157 degrees
 _MATRIX = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "matrix", "cammatrix", "mtx")
 _LISTS = {
-    "d", "dist", "distcoeff", "distcoeffs", "distortion", "distortioncoefficients", "distortioncoeffs", "distortioncoeff", "coeffs",
-    "coefficients", "distortionparameters", "distortionparams", "distortionvector", "lensdistortion", "distcoefficients",
+    "d", "kc", *(
+        f"{lens}{dist}{what}" for lens in ("", "lens") for dist in ("", "dist", "distortion")
+        for what in ("coeff", "coeffs", "coef", "coefs", "coefficient", "coefficients", "parameters", "params", "vector", "")
+        if dist or what.startswith("coef")
+    ),
 }  # fmt: skip
 _RADIAL, _TANGENTIAL = {"radialdistortion", "radial", "radialcoeffs"}, {"tangentialdistortion", "tangential", "tangentialcoeffs"}
 _MODELS = ("distortionmodel", "distmodel", "lensmodel", "distortiontype", "projectionmodel", "cameramodel", "model")
@@ -29,10 +33,13 @@ _KNOWN = {
     "plumbbob", "brown", "brownconrady", "brownconrad", "opencv", "radtan", "radialtangential", "rational", "rationalpolynomial",
     "opencvpinhole", "pinhole", "pinholeradtan", "fullopencv", "polynomial", "standard", "perspective", "thinprism",
 }  # fmt: skip
+_OF_CAMERA = {"fx", "fy", "cx", "cy", "width", "height", *_NAMED}
 _NONE = {"none", "null", "", "no", "0"}
 _STRANGE_IF_ZERO = re.compile("fisheye|equidistant|kannala|ftheta|omni|ucm|doublesphere|fov|spherical|mei")
-_SUSPECT = re.compile(r"dist(?!ance)|coeff|^[kpst]\d{1,2}$|^xi$|^tau[xy]?$")
-_PASSED_OVER = ("roi", "header", "p", "r", "projectionmatrix", "rectificationmatrix", "extrinsics", "regionofinterest")
+_SUSPECT = re.compile(r"dist(?!ance)|coeff?|^[kpst]\d{1,2}$|^xi$|^tau[xy]?$")
+_COUNTS = (4, 5, 8, 12, 14)  # of coefficients
+_NO_LENS = re.compile("quat|orient|rot|pose|posit|transl|extrin|matrix|crop|range|fov|size|intrinsics|rect|bbox|time")
+_PASSED_OVER = ("roi", "header", "r", "projectionmatrix", "rectificationmatrix", "extrinsics", "regionofinterest")
 
 
 def read_camera(table: dict[str, Any]) -> CameraIntrinsics:
@@ -40,7 +47,28 @@ def read_camera(table: dict[str, Any]) -> CameraIntrinsics:
     flat = _flattened(table)
     fx, fy, cx, cy = _focal(flat, table)
     width, height = (_side(flat, name, table) for name in ("width", "height"))
+    _check_pixels(flat, (width, height), (fx, fy), (cx, cy))
     return CameraIntrinsics.from_opencv(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, distortion=_distortion(flat))
+
+
+def _check_pixels(flat: dict[str, Any], size: tuple[int, int], focal: tuple[float, float], centre: tuple[float, float]) -> None:
+    """Raises Unreadable where the figures are of another unit, or of another image than the one of this size."""
+    for name, length, side in zip(("fx", "fy"), focal, size, strict=True):
+        if 0 < length < SHORTEST * side:
+            raise Unreadable(
+                f"{name} {length:.4g} px is under {SHORTEST:g} of an image {side} px wide or high: millimetres, or shares of its"
+                " size? pixels are needed"
+            )
+    for name, at, side in zip(("cx", "cy"), centre, size, strict=True):
+        if not -0.5 <= at <= side - 0.5:
+            raise Unreadable(
+                f"{name} {at:.6g} px lies outside the image of {side} px: is the camera's table of another resolution?"
+            )
+    for name in ("binningx", "binningy"):
+        if (binning := flat.get(name, 0)) not in (0, 1):
+            raise Unreadable(
+                f"{name} {binning}: pixels are joined, but the figures are of the whole image; give those of this image"
+            )
 
 
 def numbers(table: dict[str, Any], key: str, shape: tuple[int, ...]) -> Float[ndarray, "..."]:
@@ -77,6 +105,8 @@ def _flattened(table: dict[str, Any]) -> dict[str, Any]:
     def walk(inner: dict[str, Any], parent: str) -> None:
         for key, value in inner.items():
             name = plain(key)
+            name = name.removeprefix("camera") if name.startswith("camera") and name[6:] in _OF_CAMERA else name  # ORB-SLAM
+            name = _radial_or_tangential(name, value) if str(key).strip() != "K" else name
             if name in _PASSED_OVER:
                 continue
             if isinstance(value, dict):
@@ -94,11 +124,22 @@ def _flattened(table: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
+def _radial_or_tangential(name: str, value: Any) -> str:
+    """`k` and `p` where they hold coefficients of the lens, rather than the camera's matrix and its projection."""
+    size = np.size(value) if isinstance(value, list | int | float) else 0
+    if name == "k" and 1 <= size <= 6:
+        return "radial"
+    return name if name != "p" else "tangential" if size == 2 else "projectionmatrix"
+
+
 def _focal(flat: dict[str, Any], table: dict[str, Any]) -> tuple[float, float, float, float]:
     """fx, fy, cx, cy [px] in OpenCV's convention."""
     key = next((name for name in _MATRIX if np.size(flat.get(name, 0)) == 9 and name in flat), None)
     if key is None and "fx" not in flat and "k" in flat:
         key = "k"
+    if key is None and "fx" not in flat and np.size(flat.get("intrinsics", 0)) == 4:  # Kalibr
+        fx, fy, cx, cy = numbers(flat, "intrinsics", (4,)).tolist()
+        return fx, fy, cx, cy
     if key is None:
         if "fx" not in flat:
             raise Unreadable(f"key 'fx' is missing (found: {', '.join(map(str, table))[:80]})")
@@ -170,14 +211,28 @@ def _refuse_unknown(flat: dict[str, Any]) -> None:
     """Raises Unreadable where a key that speaks of the lens is not understood and its value not zero."""
     known = {*_LISTS, *_RADIAL, *_TANGENTIAL, *_MODELS, *_NAMED, *_MATRIX}
     for key, value in flat.items():
-        if key in known or not _SUSPECT.search(key) or value in (None, "", False) or isinstance(value, str):
+        if key in known or value in (None, "", False) or isinstance(value, str):
+            continue
+        if not _SUSPECT.search(key) and not _may_be_coefficients(key, value):
             continue
         if np.any(np.asarray(value, dtype=object) != 0):
-            raise Unreadable(f"{key}: a coefficient of the lens that is not known; give a depth image without distortion")
+            raise Unreadable(
+                f"{key}: may be a coefficient of the lens that is not known; call them D (k1 k2 p1 p2 k3), or leave the key out"
+                " where it is none"
+            )
+
+
+def _may_be_coefficients(key: str, value: Any) -> bool:
+    """Whether a list under a name that nobody knows looks like coefficients: as many numbers, some of them broken."""
+    try:
+        values = np.asarray(value, float).ravel()
+    except (TypeError, ValueError):
+        return False
+    return values.size in _COUNTS and _NO_LENS.search(key) is None and bool((values != np.round(values)).any())
 
 
 def _checked(coefficients: list[float], model: str | None) -> tuple[float, ...]:
-    name = None if model is None else plain(model)
+    name = None if model is None else plain(model).removeprefix("distortion")
     if name is not None and _STRANGE_IF_ZERO.search(name):
         raise Unreadable(f"the lens's model {model!r} is no pinhole with Brown-Conrady distortion; give a rectified depth image")
     if not np.any(coefficients):

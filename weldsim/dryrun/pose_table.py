@@ -1,4 +1,4 @@
-"""UR poses out of a text table: x y z [m] and rx ry rz [rad] on each row, as whatever program wrote it."""
+"""UR poses out of a text table: a position and a rotation on each row, as whatever program wrote it."""
 
 import re
 from dataclasses import dataclass
@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.columns import AXES, ColumnName, TextTable, find_table, is_comment, is_number, read_name
+from weldsim.columns import AXES, UNITS, ColumnName, TextTable, find_table, is_comment, is_number, read_name
 from weldsim.errors import InputError
+from weldsim.frames import matrix_from_quaternion, matrix_from_rotation_vector, rotation_vector_from_matrix
 from weldsim.records import MILLIMETRE_SPAN
 
 LONGEST_TURN = 2 * np.pi + 1e-6  # [rad] of a rotation vector
@@ -16,15 +17,19 @@ FURTHEST = 3.0  # [m] from the base: further is a unit mistaken
 OUT_OF_REACH = 1.5  # [m] from the base: no tip of this arm is further away
 LARGEST_ANGLE = 360.0  # [deg] of a joint
 WANTED = ("x", "y", "z", "rx", "ry", "rz")
-POSE = re.compile(r"\s*\"?\s*p?\[(.*)\]\s*\"?\s*[,;]?\s*")  # a pose as robot programs write it
-ROTATION = re.compile(r"(?:r|rv|rot|rotvec|rotation|rotvector|rotationvector)[ _.:-]*([xyz])")
+QUATERNION, ANGLES = ("qx", "qy", "qz", "qw"), ("roll", "pitch", "yaw")
+POSE = re.compile(r"\s*(?:(?:global\s+)?\w+\s*[=:]\s*)?\"?\s*p?\[+([^\[\]]*)\]+\s*\"?\s*[,;]?\s*")  # as programs write it
+ROTATION = re.compile(r"(?:r|rv|rot|rotvec|rotation|rotvector|rotationvector)[ _.:-]*([xyzw])")
+OF_QUATERNION = re.compile(r"(?:q|quat|quaternion|orientation|orient)[ _.:-]*([xyzw])")
+WITHIN = re.compile(r"(?:field|pose|transform|msg)[ _.:-]+")  # what a message's columns begin with
 RECORDED = re.compile(r"(?:actual|target)_tcp_pose[ _.:-]?([0-5])")  # as ur_rtde and UR's own recorder call them
 OF_THE_TOOL = re.compile(r"(?:tcp|tool0|tool|tip|torch|flange|ee)[ _.:-]+")
 JOINT = re.compile(
     r"(?:actual_|target_)?(?:q|j|a|joint|axis|theta|gelenk|achse)[ _.:-]?\d(?:[ _](?:deg|rad))?"
     r"|base|shoulder(?:[ _].*)?|elbow(?:[ _].*)?|wrist.*"
 )
-IN_METRES = ("", "m", "rad", "m/s", "s")
+IN_METRES = ("", "m", "rad", "radian", "radians", "m/s", "s")
+DEGREES = ("deg", "degree", "degrees", "\u00b0")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,12 +46,14 @@ class PoseTable:
 def read_poses(text: str, where: str) -> PoseTable:
     """The poses of a table whose columns may be named, then in any order, and parted by semicolons, tabs, commas or blanks.
 
+    Names may be those of a rotation vector, of a quaternion, or roll, pitch and yaw about fixed axes, and give units.
+
     Args:
         text: lines of six numbers, `p[...]` around them or not, with decimal points or commas; comments are passed over.
         where: the file, for errors.
     Raises:
-        InputError: fewer than two rows, a row that is short or holds something else, names without x y z rx ry rz, another
-            unit than metres and radians, numbers that are millimetres, degrees or joint angles.
+        InputError: fewer than two rows, a row that is short or holds something else, names without a position and a rotation, a
+            unit that leaves the pose open, numbers that are millimetres, degrees or joint angles.
     """
     lines = [found[1] if (found := POSE.fullmatch(line)) else line for line in text.split("\n")]
     comments = " ".join(line for line in lines if is_comment(line))
@@ -64,13 +71,14 @@ def read_poses(text: str, where: str) -> PoseTable:
         cells = table.cells(line)
         if len(cells) != (table.width if table.names else len(WANTED)):
             _refuse_width(len(cells), table, number, where)
-        values = [float(cells[k]) if is_number(cells[k]) else np.nan for k in columns]
+        values = [float(cells[column.at]) if is_number(cells[column.at]) else np.nan for column in columns]
         if not np.isfinite(values).all():
             raise InputError(f"{where}: line {number}: a number is missing or not finite", path=where, line=number)
         rows.append(values)
         labels.append("" if label is None else cells[label])
-    poses = np.array(rows, float)
-    check_poses(poses, where, [number for number, _ in body])
+    numbers = [number for number, _ in body]
+    poses = _ur_poses(np.array(rows, float) * [column.scale for column in columns], columns, where, numbers)
+    check_poses(poses, where, numbers)
     near = float(np.linalg.norm(poses[:, :3], axis=1).min())
     note = f"every pose is over {near:.2g} m from the base: if these are six joint angles, movej in a .script takes them"
     return PoseTable(
@@ -111,48 +119,110 @@ def _said(pose: Float[ndarray, "6"]) -> str:
     return ", ".join(f"{value:g}" for value in pose)
 
 
-def _columns(table: TextTable, lines: list[str], where: str) -> tuple[list[int], int | None]:
-    """Where x y z rx ry rz stand, and the name of the seam, if it has a column."""
+@dataclass(frozen=True)
+class _Column:
+    """Attributes: what it holds (x, rx, qw, roll, say); at, its place; scale, metres or radians per unit."""
+
+    what: str
+    at: int
+    scale: float = 1.0
+
+
+def _columns(table: TextTable, lines: list[str], where: str) -> tuple[list[_Column], int | None]:
+    """The columns of a pose, position first, and the one that names the seam, if there is one."""
     if table.names is None:
-        return list(range(len(WANTED))), None
+        return [_Column(what, i) for i, what in enumerate(WANTED)], None
     if table.doubled:
         raise InputError(f"{where}: twice as many columns as names: decimal commas need ; between the columns", path=where)
     found: dict[str, int] = {}
+    turned = any(match[1] == "w" for name in table.names if (match := ROTATION.fullmatch(_inner(name))) is not None)
     for i, name in enumerate(table.names):
-        if (wanted := _wanted(name)) is None:
+        if (wanted := _wanted(name, turned)) is None:
             continue
         if wanted in found and name.text.lower() != wanted:
             continue  # x is called just so by one column, and somehow like it by another
         found[wanted] = i
-    listed = ", ".join(name.text for name in table.names if name.text)[:120]
-    if missing := [name for name in WANTED if name not in found]:
+    rotation = next((kind for kind in (WANTED[3:], QUATERNION, ANGLES) if all(name in found for name in kind)), WANTED[3:])
+    if missing := [name for name in (*AXES, *rotation) if name not in found]:
+        listed = ", ".join(name.text for name in table.names if name.text)[:120]
         joints = sum(JOINT.fullmatch(_bare(name)) is not None for name in table.names) >= len(WANTED)
         hint = "these are joint angles: movej in a .script takes them; " if joints else ""
         raise InputError(
-            f"{where}: column {missing[0]} is missing among {listed}; {hint}x y z rx ry rz [m, rad] are needed", path=where
+            f"{where}: column {missing[0]} is missing among {listed}; {hint}x y z rx ry rz [m, rad] are needed, or"
+            " qx qy qz qw or roll pitch yaw for the rotation",
+            path=where,
         )
-    for wanted in WANTED:
-        name = table.names[found[wanted]]
-        if (unit := _unit(name)) not in IN_METRES:
-            line = next((n for n, text in enumerate(lines[: table.first], 1) if name.text in text), table.first)
-            raise InputError(
-                f"{where}: line {line}: column {wanted} is in {unit}; metres and radians are needed", path=where, line=line
-            )
+    columns = [_Column(name, found[name], _scale(name, table, found, lines, where)) for name in (*AXES, *rotation)]
     label = next((i for i, name in enumerate(table.names) if name.text.lower() in ("seam", "naht")), None)
-    return [found[wanted] for wanted in WANTED], label
+    return columns, label
 
 
-def _wanted(name: ColumnName) -> str | None:
-    """Which of x y z rx ry rz a column holds, or None."""
+def _scale(wanted: str, table: TextTable, found: dict[str, int], lines: list[str], where: str) -> float:
+    """Metres or radians per unit of a column. Raises InputError for a unit that is neither, or leaves the pose open."""
+    assert table.names is not None
+    name = table.names[found[wanted]]
+    unit = _unit(name)
+    of_axes = {_unit(table.names[found[axis]]) for axis in AXES}
+    if wanted in AXES and unit in UNITS and len(of_axes) == 1:
+        return UNITS[unit]
+    if wanted in ANGLES and unit in DEGREES:
+        return float(np.pi / 180)
+    if unit in IN_METRES:
+        return 1.0
+    line = next((n for n, text in enumerate(lines[: table.first], 1) if name.text in text), table.first)
+    needed = "metres and radians are needed"
+    if wanted in AXES and unit in UNITS:
+        needed += f", or {unit} of x, y and z alike"
+    elif unit in DEGREES:
+        needed += "; if they are roll, pitch and yaw, name them roll [deg], pitch [deg], yaw [deg]"
+    raise InputError(f"{where}: line {line}: column {wanted} is in {unit}; {needed}", path=where, line=line)
+
+
+def _ur_poses(values: Float[ndarray, "n k"], columns: list[_Column], where: str, lines: list[int]) -> Float[ndarray, "n 6"]:
+    """Poses as UR writes them, from rotation vectors, quaternions, or roll, pitch and yaw about fixed axes [m, rad]."""
+    kind, turns = columns[3].what, values[:, 3:]
+    if kind == "qx":
+        length = np.linalg.norm(turns, axis=1)
+        worst = int(np.abs(length - 1.0).argmax())
+        if abs(length[worst] - 1.0) > 0.01:
+            raise InputError(
+                f"{where}: line {lines[worst]}: a quaternion of length {length[worst]:.4g}, not 1", path=where, line=lines[worst]
+            )
+        return np.hstack([values[:, :3], rotation_vector_from_matrix(matrix_from_quaternion(turns[:, [3, 0, 1, 2]]))])
+    if kind == "roll":
+        worst = int(np.abs(turns).max(axis=1).argmax())
+        if (angle := float(np.abs(turns[worst]).max())) > LONGEST_TURN:
+            raise InputError(
+                f"{where}: line {lines[worst]}: an angle of {angle:.4g} rad: looks like degrees; name them roll [deg], pitch [deg],"
+                " yaw [deg]",
+                path=where,
+                line=lines[worst],
+            )
+        x, y, z = (matrix_from_rotation_vector(turns[:, i : i + 1] * np.eye(3)[i]) for i in range(3))
+        return np.hstack([values[:, :3], rotation_vector_from_matrix(z @ y @ x)])
+    return values
+
+
+def _wanted(name: ColumnName, turned: bool) -> str | None:
+    """What of a pose a column holds, or None. `turned`: whether rotation.x and so on are of a quaternion."""
     bare = _bare(name)
     if (recorded := RECORDED.fullmatch(bare)) is not None:
         return WANTED[int(recorded[1])]
-    bare = OF_THE_TOOL.sub("", bare)
-    bare = re.sub(r"_(m|mm|rad|deg)$", "", bare)
+    bare = _inner(name)
+    if (turn := OF_QUATERNION.fullmatch(bare)) is not None:
+        return f"q{turn[1]}"
     if (turn := ROTATION.fullmatch(bare)) is not None:
-        return f"r{turn[1]}"
+        return f"{'q' if turned else 'r'}{turn[1]}"
+    if bare in ANGLES:
+        return bare
     role = read_name(bare).role
     return role if role in AXES else None
+
+
+def _inner(name: ColumnName) -> str:
+    """A column's name without unit, and without the tool and the message that it is of."""
+    bare = re.sub(r"_(m|mm|cm|in|rad|deg)$", "", _bare(name))
+    return OF_THE_TOOL.sub("", WITHIN.sub("", bare))
 
 
 def _bare(name: ColumnName) -> str:
@@ -163,7 +233,7 @@ def _bare(name: ColumnName) -> str:
 def _unit(name: ColumnName) -> str:
     if name.unit is not None:
         return name.unit
-    found = re.search(r"_(m|mm|cm|rad|deg)$", name.text.lower())
+    found = re.search(r"_(m|mm|cm|in|rad|deg)$", name.text.lower())
     return "" if found is None else found[1]
 
 
@@ -172,7 +242,9 @@ def _refuse(lines: list[str], body: list[tuple[int, str]], where: str) -> None:
     if not body:
         raise InputError(f"{where}: 0 poses; a path needs two", path=where)
     rows = find_table(lines, least=3)
-    if rows is not None:
+    if rows is not None and rows.names is not None:
+        _columns(rows, lines, where)
+    if rows is not None and rows.width != len(WANTED):
         _refuse_width(rows.width, rows, rows.first + 1, where)
     number, line = body[-1]
     raise InputError(
@@ -185,7 +257,7 @@ def _refuse_width(width: int, table: TextTable, number: int, where: str) -> None
     expected = table.width if table.names else len(WANTED)
     hint = ""
     if width == 7 and not table.names:
-        hint = " (x y z and a quaternion are no UR pose)"
+        hint = " (with a quaternion name them on the first line: x y z qx qy qz qw, w where it is)"
     elif width == 12:
         hint = " (decimal commas need ; between the columns)"
     elif width > len(WANTED) and not table.names:

@@ -62,6 +62,8 @@ def read_program(
         if roll_free is not None:
             paths = tuple(_with_roll(each, roll_free) for each in paths)
         return Program(source=path.name, kind="path", paths=paths, names=tuple(seam["id"] for seam in document["seams"]))
+    if path.suffix.lower() == ".urp":
+        raise InputError(f"{path}: is PolyScope's own; the .script that it saves beside it is read", path=str(path))
     text = _text(path)
     if path.suffix.lower() in SCRIPTS:
         return parse_script(text, source=str(path), X_FT=None if tool is None else _mount(tool), q_start=q_start)

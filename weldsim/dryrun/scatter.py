@@ -17,6 +17,7 @@ from weldsim.records import TorchPath
 
 FEWEST = 7  # waypoints of which scatter can be told
 SAME = 1e-6  # [m] waypoints nearer to each other are one place
+STILL = (5e-5, 0.02)  # [m], of the longer steps: nearer waypoints were recorded while the arm stood still
 STEP = 0.001  # [m] between the poses of a refitted path
 LEAST = (1e-6, 1e-5)  # [m], [rad] scatter that counts as none
 QUANTILE = 0.35  # of the waypoints' distances: two corners among a dozen waypoints have no say yet
@@ -105,10 +106,12 @@ def refit(path: TorchPath, scatter: Scatter, share: float = 1.0) -> Refit:
 
 
 def _places(path: TorchPath) -> ndarray:
-    """Indices of the waypoints, without those in the same place as the one before."""
+    """Indices of the waypoints, without those in the same place as the one before, but for noise."""
+    steps = np.linalg.norm(np.diff(path.X_BT.p, axis=0), axis=1)
+    same = max(SAME, min(STILL[0], STILL[1] * float(np.quantile(steps, 0.9))))
     kept = [0]
     for i in range(1, len(path.X_BT)):
-        if np.linalg.norm(path.X_BT.p[i] - path.X_BT.p[kept[-1]]) > SAME:
+        if np.linalg.norm(path.X_BT.p[i] - path.X_BT.p[kept[-1]]) > same:
             kept.append(i)
     return np.array(kept)
 

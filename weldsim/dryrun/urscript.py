@@ -58,6 +58,12 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
     if not recorder.motions and recorder.halted:
         said = f": {recorder.shown}" if recorder.shown else ""
         raise InputError(f"{source}: halts before it moves{said}", path=source)
+    if not recorder.motions and recorder.effects is not None and (movers := recorder.effects.movers()):
+        raise InputError(
+            f"{source}: never calls what it defines ({', '.join(movers)[:80]}), so nothing moves; end it with the call that is"
+            f" meant, {movers[-1]}() say",
+            path=source,
+        )
     if not recorder.motions:
         raise InputError(f"{source}: makes no movej, movel, movep or servoj; there is nothing to check", path=source)
     if len(recorder.motions) < 2:

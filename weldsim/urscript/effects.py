@@ -40,6 +40,12 @@ class Effects:
             self._moves[name] = self.moves(self._scopes.functions[name].body)
         return self._moves[name]
 
+    def movers(self) -> tuple[str, ...]:
+        """The functions of the program that move the arm, those that can be called without arguments last."""
+        functions = self._scopes.functions.items()
+        found = [(name, bool(function.parameters)) for name, function in functions if self.function_moves(name) is not None]
+        return tuple(name for name, _ in sorted(found, key=lambda one: not one[1]))
+
     def shared_by(self, name: str) -> frozenset[str]:
         """The shared variables that a function or thread assigns."""
         if name not in self._assigned:

@@ -35,7 +35,7 @@ APPLIED: dict[str, dict[str, Any]] = {
         key: FOCAL | {key: LENS}
         for key in (
             "D", "d", "dist", "dist_coeffs", "distCoeffs", "distortion", "distortion_coeffs", "distortion_coefficients", "coeffs",
-            "Coeffs", "distortion_params",
+            "Coeffs", "distortion_params", "kc", "coefs", "dist_coefs", "distCoef", "lens_distortion_coefficients",
         )
     },
     "radial and tangential": FOCAL | {"radial_distortion": [0.05, -0.02, 0.01], "tangential_distortion": [0.001, -0.0007]},
@@ -50,6 +50,12 @@ APPLIED: dict[str, dict[str, Any]] = {
     "Zivid": {"CameraMatrix": {"FX": 620.0, "FY": 619.0, "CX": 311.0, "CY": 227.0}, "Distortion": UPPER,
               "width": 640, "height": 480},
     "Open3D": MATRIX | {"intrinsic_matrix": np.ravel(np.transpose(K)).tolist(), "distortion": LENS},
+    "k and p": FOCAL | {"k": [0.05, -0.02, 0.01], "p": [0.001, -0.0007]},
+    "a lens of its own": MATRIX | {"K": K, "lens": {"model": "brown", "k": [0.05, -0.02, 0.01], "p": [0.001, -0.0007]}},
+    "ORB-SLAM": {f"Camera.{key}": value for key, value in (FOCAL | NAMED).items()},
+    "Kalibr": {"cam0": {"camera_model": "pinhole", "distortion_coeffs": LENS, "distortion_model": "radtan",
+                        "intrinsics": [620.0, 619.0, 311.0, 227.0], "resolution": [640, 480]}},
+    "pyrealsense2": FOCAL | {"model": "distortion.brown_conrady", "coeffs": LENS},
     "nested": {"depth": FOCAL | {"distortion": {"model": "brown_conrady", "coeffs": LENS}}},
     "device": FOCAL | {"model": "Intel RealSense D415", "coeffs": LENS},
 }  # fmt: skip
@@ -163,8 +169,8 @@ def test_models_that_are_known_and_more_coefficients() -> None:
         ({"distortion_model": "none", "D": LENS}, "its coefficients are not zero"),
         ({"D": [0.1, 0.2, 0.3]}, "3 coefficients of the lens"),
         ({"D": [0.0] * 12 + [0.1, 0.2]}, "14 coefficients"),
-        ({"lens_dist_poly": [0.1]}, "lensdistpoly: a coefficient of the lens that is not known"),
-        ({"k7": 0.1}, "k7: a coefficient"),
+        ({"lens_dist_poly": [0.1]}, "lensdistpoly: may be a coefficient of the lens that is not known"),
+        ({"k7": 0.1}, "k7: may be a coefficient"),
         ({"D": LENS, "k1": 0.2}, "twice"),
         ({"D": "soft", "coeffs": LENS}, "'soft' is not known"),
         ({"D": [0.1, None, 0, 0]}, "d: "),
@@ -201,3 +207,33 @@ def test_coefficients_that_fold_the_image_are_refused(tmp_path: Path) -> None:
     (tmp_path / "k.json").write_text(json.dumps(FOCAL | {"D": [-3.0, 0, 0, 0]}))
     with pytest.raises(CloudFileError, match=r"fold the image over at pixel \(\d+, \d+\)"):
         read_depth_frame(tmp_path / "d.npy", tmp_path / "k.json")
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"lens_polynomial": [0.1, -0.02, 0.0, 0.003]}, "lenspolynomial: may be a coefficient"),
+        ({"fx": 0.97, "fy": 1.29, "cx": 0.49, "cy": 0.47}, "fx 0.97 px is under 0.1 of an image 640 px"),
+        ({"fx": 1.88, "fy": 1.88}, "millimetres"),
+        ({"cx": 933.0}, "cx 933 px lies outside the image of 640 px"),
+        ({"cy": -20.0}, "cy -20 px lies outside the image of 480 px"),
+        ({"binning_x": 2, "binning_y": 2}, "pixels are joined"),
+        ({"model": "SIMPLE_RADIAL", "k": 0.1}, "SIMPLE_RADIAL' is not known"),
+        ({"model": "distortion.inverse_brown_conrady", "coeffs": LENS}, "is not known"),
+    ],
+)
+def test_figures_of_another_unit_image_or_lens_are_refused(more: dict[str, Any], words: str) -> None:
+    with pytest.raises(Unreadable, match=words):
+        read_camera(FOCAL | more)
+
+
+def test_lists_that_are_no_coefficients_are_passed_over() -> None:
+    for more in (
+        {"crop": [0, 0, 640, 480]},
+        {"pose_quaternion": [0.5, 0.5, 0.5, 0.5]},
+        {"fov": [54.6, 42.3]},
+        {"binning_x": 0, "binning_y": 1},
+        {"P": [620.0, 0, 311.5, 0, 0, 619.0, 227.5, 0, 0, 0, 1, 0]},
+        {"p": [620.0, 0, 311.5, 0, 0, 619.0, 227.5, 0, 0, 0, 1, 0]},
+    ):
+        assert read_camera(FOCAL | more).distortion == ()

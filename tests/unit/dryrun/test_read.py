@@ -139,7 +139,7 @@ def test_a_script_is_read_in_the_order_in_which_it_moves(tmp_path, newline):
         ("p.csv", f"{POSE}\nnan,0,0,0,0,0\n", "line 2"),
         ("p.csv", f"{POSE}\n12.0,-450.0,100.0,3.1,0,0\n", "millimetres"),
         ("p.csv", f"{POSE}\n0,-0.45,0.1,180.0,0,0\n", "degrees"),
-        ("p.csv", f"x [mm],y [mm],z [mm],rx,ry,rz\n{POSE}\n{POSE}\n", "line 1: column x is in mm"),
+        ("p.csv", f"x [mm],y,z,rx,ry,rz\n{POSE}\n{POSE}\n", "line 1: column x is in mm"),
         ("p.csv", f"{POSE}\n{POSE}\n".replace(".", ","), "line 1: .* columns"),
         ("p.csv", f"{POSE}\n{POSE}\n", "all 2 poses are in one place"),
         ("p.json", json.dumps(_document(poses=[{**p, "s": 1e3 * p["s"]} for p in _poses()])), "arc length in metres"),
@@ -344,3 +344,22 @@ def test_an_option_that_a_file_has_no_use_for_is_refused(tmp_path, name, said, s
     read_program(file)
     with pytest.raises(InputError, match=says):
         read_program(file, **said)
+
+
+@pytest.mark.parametrize(
+    "before", ["sec lamp():\n  set_digital_out(1, True)\nend\n", "def weld(pose, speed=0.01):\n  movel(pose, v=speed)\nend\n"]
+)
+def test_a_script_that_never_calls_what_it_defines_says_so_and_the_call_helps(tmp_path, before):
+    file = tmp_path / "two.script"
+    text = f"{before}def go():\n  movel(p[{POSE}])\n  movel(p[0.05,{POSE[4:]}])\nend\n"
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"never calls what it defines \(.*go\).* go\(\) say$"):
+        read_program(file)
+    file.write_text(text + "go()\n")
+    assert len(read_program(file).motions) == 2
+
+
+def test_polyscopes_own_file_is_named_for_what_it_is(tmp_path):
+    (tmp_path / "weld.urp").write_bytes(b"\x1f\x8b\x08")
+    with pytest.raises(InputError, match=r"is PolyScope's own; the \.script"):
+        read_program(tmp_path / "weld.urp")

@@ -52,6 +52,25 @@ def test_scatter_is_told_as_it_is(position, rotation) -> None:
     assert all(0.6 * position < one.position < 1.6 * position for one in found)
 
 
+def test_waypoints_recorded_while_the_arm_stood_still_are_one_place() -> None:
+    """Three readings of each waypoint, microns apart: their scatter about the path is that of the waypoints read once."""
+    path = waypoints(60, seed=4, position=2e-4, rotation=5e-3)
+    index = np.repeat(np.arange(60), 3)
+    p = path.X_BT.p[index] + np.random.default_rng(1).normal(0, 2e-6, (180, 3))
+    still = replace(
+        path,
+        X_BT=Transform("BT", path.X_BT.R[index], p),
+        s=arc_length(p),
+        speed=path.speed[index],
+        arc_on=path.arc_on[index],
+        segments=tuple(path.segments[i] for i in index),
+    )
+    once, thrice = scatter_of(path), scatter_of(still)
+    assert thrice.position == pytest.approx(once.position, rel=0.05)
+    assert thrice.rotation == pytest.approx(once.rotation, rel=0.05)
+    assert refit(still, thrice).position_off == pytest.approx(refit(path, once).position_off, rel=0.1)
+
+
 def test_exact_waypoints_have_no_scatter_and_a_jump_is_none() -> None:
     path = waypoints()
     assert scatter_of(path).position < 2e-5

@@ -214,3 +214,23 @@ def test_polygons_are_cut_into_as_many_triangles_and_their_area() -> None:
         assert len(faces) == corners - 2
         assert (crosses > 0).all()
         assert crosses.sum() == pytest.approx(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".obj", ".ply"])
+def test_a_mesh_is_known_by_its_content_not_by_its_name(tmp_path: Path, suffix: str) -> None:
+    for written in (
+        stl(tmp_path / "a.stl", CORNERS, FACES),
+        stl(tmp_path / "b.stl", CORNERS, FACES, text=True),
+        obj(tmp_path / "c.obj", CORNERS, POLYGONS),
+    ):
+        is_the_plate(read_mesh_file(written.rename(tmp_path / f"renamed{suffix}")))
+
+
+def test_an_stl_that_is_cut_off_is_called_that_and_bytes_after_it_are_passed_over(tmp_path: Path) -> None:
+    path = stl(tmp_path / "part.stl", CORNERS, FACES)
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"\0" * 17)
+    is_the_plate(read_mesh_file(path))
+    path.write_bytes(whole[:-60])
+    with pytest.raises(SceneError, match=rf"promises {len(FACES)} facets, the file holds {len(FACES) - 2}: cut off"):
+        read_mesh_file(path)

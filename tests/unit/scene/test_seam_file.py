@@ -92,3 +92,13 @@ def test_names_that_are_not_understood_are_refused_with_all_of_them(tmp_path: Pa
     with pytest.raises(SceneError, match=r"columns 'x, y, z, breadth'; wanted are x, y, z"):
         read(tmp_path / "s.csv", "x,y,z,breadth\n0,0,20,14\n5,0,20,14\n")
     assert read(tmp_path / "s.csv", "x,y,z,width\n0,0,20,14\n5,0,20,14\n").width is not None
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_column_that_counts_the_rows_is_not_taken_for_x_and_naming_it_helps(tmp_path: Path, first: int) -> None:
+    rows = [f"{i + first},{-115 + 5 * i},0,20" for i in range(9)]
+    (tmp_path / "s.csv").write_text("\n".join(rows))
+    with pytest.raises(SceneError, match="counts the rows; name the columns in a first line: id,x,y,z"):
+        read_seam_file(tmp_path / "s.csv", 1e-3)
+    (tmp_path / "s.csv").write_text("\n".join(["id,x,y,z", *rows]))
+    np.testing.assert_allclose(read_seam_file(tmp_path / "s.csv", 1e-3).points[0], [-0.115, 0, 0.02])

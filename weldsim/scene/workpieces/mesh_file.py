@@ -18,6 +18,9 @@ from weldsim.scene.workpieces.shells import Broken, Shells, outward
 SUFFIXES = (".stl", ".obj", ".ply")
 MOST_FACES = 200_000
 SAME_PLACE = 1e-6  # of the part's longest side: vertices nearer to one another are one, where exact places leave it open
+_STL_HEAD = 84  # bytes before the facets of a binary STL, the last four of them their number
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_OBJ = re.compile(rb"^v[ \t]+[-+.\d]", re.MULTILINE)
 _COMMA = re.compile(rb"(?<=\d),(?=\d)")
 
 
@@ -55,10 +58,11 @@ def read_mesh_file(path: Path) -> MeshFile:
     except OSError as error:
         raise SceneError(f"mesh.file {path}: cannot be read ({error.strerror})", path=str(path), key="file") from None
     try:
-        vertices, faces = _read_any(content, path.suffix.lower())
+        vertices, faces = _read_any(content)
     except Exception as error:  # readers raise whatever the bytes lead them to
         raise SceneError(
-            f"mesh.file {path}: no {path.suffix[1:].upper()} ({type(error).__name__}: {error})", path=str(path)
+            f"mesh.file {path}: no {path.suffix[1:].upper()} ({type(error).__name__}: {error or 'it ends too early'})",
+            path=str(path),
         ) from None
     if len(faces) == 0 or not np.isfinite(vertices).all():
         raise SceneError(f"mesh.file {path}: holds no triangles", path=str(path), key="file")
@@ -115,21 +119,34 @@ def _without_walls(
     return vertices, faces[number[which.ravel()] == 1]
 
 
-def _read_any(content: bytes, suffix: str) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"]]:
-    """Vertices and faces, not merged yet. Raises whatever the bytes lead to."""
+def _read_any(content: bytes) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"]]:
+    """Vertices and faces, not merged yet, of what the content shows, whatever the file is called. Raises whatever it leads to."""
+    is_ply = content.removeprefix(b"\xef\xbb\xbf").lstrip()[:4].rstrip() == b"ply"
     if b"\0" not in content or content.lstrip().startswith(b"ply\nformat ascii"):  # a text
         content = decode(_COMMA.sub(b".", content)).encode()
-    if suffix == ".obj":
-        return _read_obj(content)
-    if suffix == ".ply":
+    if is_ply:
         points, polygons = read_ply_mesh(content)
         return points, triangulated(points, polygons)
+    if _OBJ.search(content) is not None and b"\0" not in content:
+        return _read_obj(content)
+    if b"\0" in content and len(content) >= _STL_HEAD:
+        return _read_binary_stl(content)
     import trimesh
 
     mesh = trimesh.load_mesh(io.BytesIO(content), file_type="stl", process=False)
     if not isinstance(mesh, trimesh.Trimesh):
         raise TypeError("no mesh")
     return np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+
+
+def _read_binary_stl(content: bytes) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"]]:
+    """Corners and facets of a binary STL; bytes after them are passed over. Raises ValueError for one that is cut off."""
+    count = int.from_bytes(content[_STL_HEAD - 4 : _STL_HEAD], "little")
+    held = (len(content) - _STL_HEAD) // _FACET.itemsize
+    if count > held:
+        raise ValueError(f"its header promises {count} facets, the file holds {held}: cut off?")
+    corners = np.frombuffer(content, _FACET, count, _STL_HEAD)["corners"].reshape(-1, 3).astype(float)
+    return corners, np.arange(len(corners)).reshape(-1, 3)
 
 
 def _read_obj(content: bytes) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "f 3"]]:

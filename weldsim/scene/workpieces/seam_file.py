@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.columns import AXES, NORMALS, UNITS, ColumnName, TextTable, by_role, decode, find_table, is_comment, is_number
+from weldsim.columns import AXES, NORMALS, UNITS, ColumnName, TextTable, by_role, counts, decode, find_table, is_comment, is_number
 from weldsim.errors import SceneError
 
 COLUMNS = (*AXES, *NORMALS, "width")
@@ -57,6 +57,11 @@ def read_seam_file(path: Path, scale: float) -> SeamFile:
     numbers, points = numbers[moved], points[moved]
     if len(points) < 2:
         raise SceneError(f"{path}: its points are all the same; a seam needs two", path=str(path))
+    if table.names is None and table.width > len(AXES) and counts(numbers[:, 0].tolist()):
+        raise SceneError(
+            f"{path}, line {table.first + 1}: what would be x counts the rows; name the columns in a first line: id,x,y,z say",
+            path=str(path),
+        )
     values = {name: numbers[:, i] for i, name in enumerate(column)}
     normals = np.stack([values[name] for name in NORMALS], axis=1) if "nx" in values else None
     if normals is not None and not (np.linalg.norm(normals, axis=1) > 1e-6).all():
