@@ -8,7 +8,7 @@ from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell, shifted
 from weldsim.dryrun.fix import changed_program, leaned, turned_about_wire
-from weldsim.dryrun.program import Program
+from weldsim.dryrun.program import Given, Program
 from weldsim.errors import InputError
 from weldsim.records import TorchPath
 
@@ -41,6 +41,8 @@ def changed(program: Program, cell: Cell, change: Change) -> tuple[Program, Cell
         program = changed_program(program, turn=change.turn or 0.0, move=move)
     else:
         program = replace(program, paths=tuple(_changed_path(path, change, move) for path in program.paths))
+    lean = (0.0, 0.0) if change.lean is None else (float(change.lean[0]), float(change.lean[1]))
+    program = replace(program, given=Given(turn=change.turn or 0.0, lean=lean))
     return program, cell if move is None else cell.moved(move)
 
 

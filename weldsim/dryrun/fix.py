@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell, shifted
 from weldsim.dryrun.path_faults import FASTEST
-from weldsim.dryrun.program import Program
+from weldsim.dryrun.program import Given, Program
 from weldsim.dryrun.sieve import quick
 from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.try_script import try_script
@@ -27,6 +27,8 @@ from weldsim.records import Segment, TorchPath
 from weldsim.scene.cell import TABLE
 
 TURNS = np.deg2rad([s * a for a in (5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 105, 120, 135, 150, 165, 180) for s in (1, -1)])
+AS_READ = Given()
+LEAN_MOST = np.deg2rad(60.0)  # that `--lean` takes
 LEANS = np.deg2rad([5.0, 10.0, 15.0, 20.0, 30.0])
 LEADS = (0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.10, 0.15)  # [m] tried for lead-in and lead-out
 LOOSE = re.compile(r"clamp_(bolt_)?\d+")  # names of what can be taken away begin so
@@ -45,9 +47,19 @@ Progress = Callable[[float], None]
 
 
 def fixes_for_path(
-    path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell: Progress = lambda done: None
+    path: TorchPath,
+    trial: Trial,
+    cell: Cell,
+    config: MotionConfig,
+    tell: Progress = lambda done: None,
+    *,
+    given: Given = AS_READ,
 ) -> tuple[Fix, ...]:
-    """What would help a path that failed: a slower weld, a turn about the wire, a place for the part, cuts; all verified."""
+    """What would help a path that failed: a slower weld, a turn about the wire, a place for the part, cuts; all verified.
+
+    Args:
+        given: what the path was turned and leaned by already: an option tells both together.
+    """
     failure = trial.failure
     if failure is None or failure.why in ("orientation jump", "turns back"):
         return ()
@@ -59,10 +71,10 @@ def fixes_for_path(
     config = replace(config, candidates=min(config.candidates, CANDIDATES))
     found = _lead(path, trial, cell, config) if trial.lead else []
     if not path.roll_free:
-        found += _turn(path, trial, cell, config)
+        found += _turn(path, trial, cell, config, given)
     if failure.why == "collision":
         found += _taken_away(path, trial, cell, config)
-    found += _lean(path, trial, cell, config)
+    found += _lean(path, trial, cell, config, given)
     # A part that is moved takes with it what stands in the way.
     if failure.why != "collision" or not found:
         found += _move(path, trial, cell, config, tell)
@@ -70,14 +82,16 @@ def fixes_for_path(
     return tuple(found)
 
 
-def applied(fix: Fix, path: TorchPath, cell: Cell, config: MotionConfig) -> tuple[tuple[TorchPath, ...], Cell, MotionConfig]:
-    """Path, cell and settings with the change made; several paths where the weld is cut."""
+def applied(
+    fix: Fix, path: TorchPath, cell: Cell, config: MotionConfig, *, given: Given = AS_READ
+) -> tuple[tuple[TorchPath, ...], Cell, MotionConfig]:
+    """Path, cell and settings with the change made; several paths where the weld is cut. Args: given, as for `fixes_for_path`."""
     paths: tuple[TorchPath, ...] = (path,)
     match fix.kind:
         case "turn about the wire":
-            paths = (_with(path, X_BT=turned_about_wire(path.X_BT, fix.turn)),)
+            paths = (_with(path, X_BT=reposed(path.X_BT, given, turn=fix.turn)),)
         case "lean the torch":
-            paths = (_with(path, X_BT=leaned(path.X_BT, *fix.lean)),)
+            paths = (_with(path, X_BT=reposed(path.X_BT, given, lean=fix.lean)),)
         case "move the part":
             paths, cell = (_with(path, X_BT=shifted(path.X_BT, np.array(fix.move))),), cell.moved(np.array(fix.move))
         case "slower":
@@ -110,15 +124,15 @@ def _slower(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> 
     return ()
 
 
-def _turn(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
+def _turn(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, given: Given) -> list[Fix]:
     tries = 0
     for turn in TURNS:
-        changed = _with(path, X_BT=turned_about_wire(path.X_BT, float(turn)))
+        changed = _with(path, X_BT=reposed(path.X_BT, given, turn=float(turn)))
         if not _quick(changed, trial, cell, config):
             continue
         if try_path(changed, trial.name, cell, config).passed:
             text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg all along"
-            return [Fix(kind="turn about the wire", text=text, turn=float(turn), how=_turning(turn))]
+            return [Fix(kind="turn about the wire", text=text, turn=float(turn), how=_turning(given.turn + turn))]
         if (tries := tries + 1) >= _tries(path, FULL_TRIES):
             break
     return []
@@ -163,17 +177,20 @@ def _lead(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> li
     return []
 
 
-def _lean(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig) -> list[Fix]:
+def _lean(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, given: Given) -> list[Fix]:
     tries = 0
     for angle in LEANS:
         for lean in ((angle, 0.0), (-angle, 0.0), (0.0, angle), (0.0, -angle)):
-            changed = _with(path, X_BT=leaned(path.X_BT, *lean))
+            both = (given.lean[0] + lean[0], given.lean[1] + lean[1])
+            if max(map(abs, both)) > LEAN_MOST:  # the option takes no more
+                continue
+            changed = _with(path, X_BT=reposed(path.X_BT, given, lean=lean))
             if not _quick(changed, trial, cell, config):
                 continue
             if try_path(changed, trial.name, cell, config).passed:
                 which = "work" if lean[0] else "travel"
                 text = f"add {np.rad2deg(lean[0] + lean[1]):+.0f} deg of {which} angle"
-                how = f'--lean "{np.rad2deg(lean[0]):.0f} deg, {np.rad2deg(lean[1]):.0f} deg"'
+                how = f'--lean "{_degrees(both[0])}, {_degrees(both[1])}"'
                 return [Fix(kind="lean the torch", text=text, lean=(float(lean[0]), float(lean[1])), how=how)]
             if (tries := tries + 1) >= _tries(path, FULL_TRIES):
                 return []
@@ -185,6 +202,13 @@ def leaned(X_BT: Transform, work: float, travel: float) -> Transform:
     turn = Transform.from_rotation_vector("TT", np.array([work, 0.0, 0.0]), np.zeros(3))
     turn = turn @ Transform.from_rotation_vector("TT", np.array([0.0, travel, 0.0]), np.zeros(3))
     return Transform("BT", X_BT.R @ turn.R, X_BT.p)
+
+
+def reposed(X_BT: Transform, given: Given, turn: float = 0.0, lean: tuple[float, float] = (0.0, 0.0)) -> Transform:
+    """The poses as they are when turned and leaned by so much more than was given [rad]: turned first, then leaned."""
+    before = leaned(Transform("TT", np.eye(3), np.zeros(3)), *given.lean)
+    read = turned_about_wire(Transform("BT", X_BT.R @ before.R.T, X_BT.p), turn)
+    return leaned(read, given.lean[0] + lean[0], given.lean[1] + lean[1])
 
 
 def _move(path: TorchPath, trial: Trial, cell: Cell, config: MotionConfig, tell: Progress) -> list[Fix]:
@@ -235,7 +259,13 @@ def moved_fix(move: Float[ndarray, "3"], place: tuple[float, float] | None = Non
 
 
 def _turning(turn: float) -> str:
-    return f'--turn "{np.rad2deg(turn):.0f} deg"'
+    turn = (turn + np.pi) % (2 * np.pi) - np.pi if abs(turn) > np.pi + 1e-9 else turn
+    return f'--turn "{_degrees(turn)}"'
+
+
+def _degrees(angle: float) -> str:
+    """An angle [rad] as an option takes it."""
+    return f"{round(float(np.rad2deg(angle)), 6) + 0.0:.10g} deg"
 
 
 def _leaving_out(cell: Cell, away: list[str]) -> str:
@@ -303,7 +333,8 @@ def fixes_for_script(program: Program, trial: Trial, cell: Cell, tell: Progress 
     for turn, changed in islice((pair for pair in turns if _held(pair[1], failure.index, cell)), FULL_TRIES):
         if try_script(changed, cell).passed:
             text = f"turn the torch about its wire by {np.rad2deg(turn):+.0f} deg at every pose"
-            found.append(Fix(kind="turn about the wire", text=text, turn=float(turn), how=_turning(turn)))
+            how = _turning(program.given.turn + turn)
+            found.append(Fix(kind="turn about the wire", text=text, turn=float(turn), how=how))
             break
     points = np.stack([motion.X_BT.p for motion in program.motions if motion.X_BT is not None])
     tries = 0

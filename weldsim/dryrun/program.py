@@ -37,6 +37,14 @@ class Motion:
     arc: bool = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """Attributes: turn about the wire, and then lean, added work and travel angle, that poses were given by options [rad]."""
+
+    turn: float = 0.0
+    lean: tuple[float, float] = (0.0, 0.0)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Program:
     """What a file asks of the arm.
@@ -47,6 +55,7 @@ class Program:
         motions: what a script commands, in order; empty otherwise.
         X_FT: flange to the tool that the poses are of.  pauses: time in which a script stands still [s].
         notes: what was assumed, one sentence each.
+        given: what the poses were turned and leaned by already.
     """
 
     source: str
@@ -57,3 +66,4 @@ class Program:
     X_FT: Transform = X_FT
     pauses: float = 0.0
     notes: tuple[str, ...] = ()
+    given: Given = Given()

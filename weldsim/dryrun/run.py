@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
@@ -38,7 +39,8 @@ def dry_run(
         tell(name, None)
         followed, trial = try_waypoints(path, name, cell, config)
         trials.append(trial)
-        fixes.append(fixes_for_path(followed, trial, cell, config, lambda done: tell("fixes", done)) if fix else ())
+        told = partial(tell, "fixes")
+        fixes.append(fixes_for_path(followed, trial, cell, config, told, given=program.given) if fix else ())
     trials = [replace(trial, margins=margins(trial, cell, config)) for trial in trials]
     notes = (*program.notes, *cell.notes)
     return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=notes)

@@ -11,6 +11,8 @@ import pytest
 
 from tests.torch_paths import flat_curve, torch_path
 from weldsim.cli import main
+from weldsim.dryrun.fix import leaned, reposed, turned_about_wire
+from weldsim.dryrun.program import Given
 from weldsim.errors import SceneError
 from weldsim.scene.config import FixtureConfig, SceneConfig
 from weldsim.scene.world import build_world
@@ -49,6 +51,29 @@ def test_every_fix_passes_with_its_options(middle, options, kinds, tmp_path, cap
         assert dry(capsys, str(file), *options, "--no-fix", *how)["passed"], fix
 
 
+@pytest.mark.parametrize("turned", [(), ("--turn", "35 deg")])
+def test_a_fix_of_a_leaned_torch_takes_the_place_of_that_option(turned, tmp_path, capsys) -> None:
+    """The option that is told holds what was given and what is added: it is the whole of the change that was checked."""
+    file = written(tmp_path / "job.csv", flat_curve("line", 0.04) + np.array((0.0, -0.45, 0.03)))
+    command = (str(file), "--scene", "straight", *turned)
+    (fix,) = dry(capsys, *command, "--lean", "50 deg, 40 deg")["trials"][0]["fixes"]
+    option, value = shlex.split(fix["how"])
+    work, travel = (float(part.removesuffix(" deg")) for part in value.split(", "))
+    assert option == "--lean"
+    assert (work, travel) == pytest.approx((50 + np.rad2deg(fix["lean"][0]), 40 + np.rad2deg(fix["lean"][1])))
+    assert dry(capsys, *command, "--no-fix", option, value)["passed"]
+
+
+def test_poses_turned_and_leaned_further_are_those_of_the_sums() -> None:
+    rng = np.random.default_rng(4)
+    read = torch_path(flat_curve("line", 0.04), DOWN).X_BT
+    for turn, more, work, travel, w, t in rng.uniform(-0.6, 0.6, (20, 6)):
+        before = leaned(turned_about_wire(read, turn), work, travel)
+        after = leaned(turned_about_wire(read, turn + more), work + w, travel + t)
+        found = reposed(before, Given(turn=turn, lean=(work, travel)), more, (w, t))
+        np.testing.assert_allclose(found.R, after.R, atol=1e-12)
+
+
 def test_a_script_turned_or_moved_is_judged_there(tmp_path, capsys) -> None:
     file = tmp_path / "far.script"
     file.write_text("movej(p[0, -0.5, 0.1, 0, 3.1416, 0])\nmovel(p[0.05, -0.5, 0.1, 0, 3.1416, 0], v=0.02)\n")
@@ -68,6 +93,10 @@ def test_a_program_is_turned_past_its_first_failure(tmp_path, capsys) -> None:
     turns = [fix for fix in found["trials"][0]["fixes"] if fix["kind"] == "turn about the wire"]
     assert turns
     assert dry(capsys, str(file), *shlex.split(turns[0]["how"]))["passed"]
+    further = dry(capsys, str(file), "--turn", "2 deg")["trials"][0]["fixes"][0]["how"]  # told is the whole turn, not what is added
+    assert shlex.split(further)[0] == "--turn"
+    assert float(shlex.split(further)[1].removesuffix(" deg")) % 5 == pytest.approx(2.0)
+    assert dry(capsys, str(file), *shlex.split(further))["passed"]
 
 
 def test_clamps_and_bolts_are_left_out_by_name() -> None:
