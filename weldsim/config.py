@@ -186,6 +186,8 @@ def _structured(tables: Mapping[str, Any], cls: type[Config], where: str, given:
             more = _meant(key, cls, given)
         elif isinstance(limit, tuple) and "unit" in error.data:
             more = units.meant(value_at(tables, key), str(error.data["unit"]), *limit)
+        elif isinstance(limit, tuple):
+            more = units.meant_percent(value_at(tables, key), *limit)
         if not more:
             raise
         fault, mark, allowed = str(error).partition("; allowed")

@@ -172,6 +172,8 @@ def _plain(value: Any, hint: Any) -> Any:
         return _choice(value, hint)
     if hint is float and isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
         return float(value)
+    if hint is float and isinstance(value, str) and (share := units.percent(value)) is not None:
+        return share
     if hint is not float and type(value) is hint:
         return value
     raise _wrong(value, hint)
@@ -258,8 +260,8 @@ def _table_dumper(cls: Any) -> Callable[[Any], Any]:
     return make_dict_unstructure_fn(cls, CONVERTER, **_omitted(cls))
 
 
-def _faults(error: BaseException, path: str) -> Iterable[tuple[str, dict[str, Any]]]:
-    """(message, data) of every leaf of a cattrs error, each message led by its dotted path."""
+def _faults(error: BaseException, path: str, cl: type | None = None) -> Iterable[tuple[str, dict[str, Any]]]:
+    """(message, data) of every leaf of a cattrs error, each message led by its dotted path. Args: cl, whose field is at fault."""
     for note in getattr(error, "__notes__", ()):
         if isinstance(note, AttributeValidationNote):
             path = f"{path}.{note.name}".lstrip(".")
@@ -268,7 +270,7 @@ def _faults(error: BaseException, path: str) -> Iterable[tuple[str, dict[str, An
     lead = f"{path}: " if path else ""
     if isinstance(error, ClassValidationError | IterableValidationError):
         for inner in error.exceptions:
-            yield from _faults(inner, path)
+            yield from _faults(inner, path, error.cl)
     elif isinstance(error, ForbiddenExtraKeysError):
         allowed = [entry.name for entry in settings(error.cl)]
         for key in sorted(map(str, error.extra_fields)):
@@ -280,7 +282,9 @@ def _faults(error: BaseException, path: str) -> Iterable[tuple[str, dict[str, An
             )
     elif isinstance(error, KeyError):
         dotted = f"{path}.{error.args[0]}".lstrip(".") if not path.endswith(str(error.args[0])) else path
-        yield f"key {dotted!r} is missing", {"key": dotted}
+        hint = None if cl is None else get_type_hints(cl, include_extras=True).get(str(error.args[0]))
+        wanted = f": one of {', '.join(map(str, get_args(hint)))}" if get_origin(hint) is Literal else ""
+        yield f"key {dotted!r} is missing{wanted}", {"key": dotted}
     else:
         data, text = dict(getattr(error, "data", {})), str(error).removeprefix("value: ")
         data["key"] = _under(path, str(data["key"])) if "key" in data else path

@@ -67,6 +67,19 @@ def meant(value: object, dimension: str, low: float, high: float) -> str:
     return "" if unit is None else f'"{match[1]} {unit}" is meant?'
 
 
+def percent(text: str) -> float | None:
+    """The share that "30 %" is, 0.3; None for any other text."""
+    match = _NUMBER_UNIT.fullmatch(text.strip().removesuffix("%"))
+    return float(match[1]) / 100 if match is not None and not match[2] and text.strip().endswith("%") else None
+
+
+def meant_percent(value: object, low: float, high: float) -> str:
+    """What a bare number outside a share's range was meant as, '"30 %" is meant?'; "" where that lies outside too."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not (high <= 1 < value and low <= value / 100 <= high):
+        return ""
+    return f'"{value:g} %" is meant?'
+
+
 def written(value: float, dimension: str) -> tuple[str, str]:
     """The number and the unit with which welders write an SI value, to six digits; `parse` reads the two together."""
     unit = COMMON.get(dimension, (dimension,))[0]

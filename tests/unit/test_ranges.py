@@ -105,3 +105,30 @@ def test_widths_are_in_order(low: str, high: str) -> None:
     limit = getattr(CellConfig().seam.profile, high)
     with pytest.raises(WeldsimError, match=f"seam.profile.{high}"):
         cell(f"seam.profile.{low}", math.nextafter(limit, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "meant"),
+    [
+        ("groove.width", "10", "10 mm"),
+        ("groove.angle", "60", "60 deg"),  # one that may be left out has its unit all the same
+        ("groove.root_gap", "4", "4 mm"),
+        ("plate.length", "240", "240 mm"),
+        ("centre_line.radius", "100", "100 mm"),
+        ("fixture.overlap", "18", "18 mm"),
+        ("pose.z", "30", "30 mm"),
+        ("limits.max", "2", "2 mm"),
+    ],
+)
+def test_a_size_in_millimetres_without_its_unit_is_asked_back(key: str, value: str, meant: str) -> None:
+    with pytest.raises(WeldsimError, match=rf'{key} = {value} (m|rad) is outside .* (m|rad); "{meant}" is meant\?'):
+        scene("straight", key, value)
+
+
+def test_a_share_may_be_written_in_percent() -> None:
+    assert cell("motion.least_speed", "30 %").motion.least_speed == pytest.approx(0.3)
+    assert load_scene("straight", ['limits.least_speed="20%"']).limits.least_speed == pytest.approx(0.2)
+    with pytest.raises(WeldsimError, match=r'limits\.least_speed = 30 is outside 0 to 1; "30 %" is meant\?'):
+        scene("straight", "limits.least_speed", 30)
+    with pytest.raises(WeldsimError, match="outside"):
+        cell("motion.least_speed", "130 %")

@@ -87,7 +87,8 @@ def several(words: Sequence[str], kind: Quantity, option: str) -> tuple[float, .
 
 
 def _value(word: str, kind: Quantity, where: str) -> float:
-    number = _plain(word, where)
+    share = None if kind.unit else units.percent(word)
+    number = _plain(word, where) if share is None else share
     if number is None and not kind.unit:
         raise InputError(f"{where}: {word!r} is no number", value=word)
     value = units.parse(word, kind.unit, where=where) if number is None else number
@@ -101,8 +102,8 @@ def _value(word: str, kind: Quantity, where: str) -> float:
     else:
         said = f"{value:.6g}{unit}? write the unit"
     meant = units.meant(word, kind.unit, kind.low, kind.high)
-    if kind is SHARE and 1.0 < value <= 100.0:
-        meant = f"{value / 100:g} is meant?"
+    if kind is SHARE and share is None:
+        meant = units.meant_percent(value, kind.low, kind.high)
     raise InputError(f"{where}: {said}{f'; {meant}' if meant else ''}", value=value, limit=(kind.low, kind.high))
 
 

@@ -112,7 +112,7 @@ def way(start: Joints, goal: Joints, config: "MotionConfig", blocked: Blocked, v
         stops = roam(start, goal, blocked)
     if stops is None:
         raise MotionError(
-            f"scan view {view}: the arm finds no way there: {touch}; change the view, or the order of views",
+            f"scan view {view + 1}: the arm finds no way there: {touch}; change the view, or the order of views",
             view=view,
             reason=touch,
         )

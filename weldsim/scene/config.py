@@ -7,8 +7,8 @@ import numpy as np
 
 from weldsim.errors import SceneError
 from weldsim.frames import Transform, matrix_from_rotation_vector
-from weldsim.quantity import Metre, Radian, require_within
-from weldsim.scene.views import REACH, TURN, CameraPoseConfig, ViewConfig
+from weldsim.quantity import REACH, SIZE, TURN, Metre, Radian, require_within
+from weldsim.scene.views import CameraPoseConfig, ViewConfig
 from weldsim.scene.workpieces.base import Workpiece
 from weldsim.scene.workpieces.branches import BranchesConfig, make_branched_plate
 from weldsim.scene.workpieces.centre_line import CentreLineConfig
@@ -83,6 +83,7 @@ class FixtureConfig:
     def __post_init__(self) -> None:
         if self.clamps not in (0, 2, 4):
             raise SceneError(f"fixture: {self.clamps} clamps; 0, 2 or 4 can be placed", key="clamps", limit=4)
+        require_within(self, {"overlap": SIZE}, "fixture")
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,8 @@ import numpy as np
 
 from weldsim.errors import ConfigError, SceneError
 from weldsim.frames import Transform, matrix_from_rotation_vector
-from weldsim.quantity import Metre, Radian, require_within
+from weldsim.quantity import REACH, TURN, Metre, Radian, require_within
 
-REACH, TURN = (-3.0, 3.0), (-2 * np.pi, 2 * np.pi)  # [m], [rad] a bare number beyond was meant as millimetres or degrees
 WIDEST = float(np.radians(120))  # tilt of a view: sides are seen level, or a little from below
 
 

@@ -103,7 +103,7 @@ class World:
                 return q
         reason = "every joint solution collides or hides the part" if len(solutions) else "no joint solution"
         raise ViewError(
-            f"scan view {view}: {reason} with the flange at ({X_BF.p[0]:.3f}, {X_BF.p[1]:.3f}, {X_BF.p[2]:.3f}) m in base;"
+            f"scan view {view + 1}: {reason} with the flange at ({X_BF.p[0]:.3f}, {X_BF.p[1]:.3f}, {X_BF.p[2]:.3f}) m in base;"
             " change the view's standoff, tilt or roll, or move the part",
             view=view,
             position=tuple(X_BF.p),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from weldsim.config import load_toml, structure
 from weldsim.curves import project
-from weldsim.errors import SceneError
+from weldsim.errors import ConfigError, SceneError
 from weldsim.frames import unit
 from weldsim.scene.config import SceneConfig
 from weldsim.scene.files import scene_path
@@ -199,15 +199,15 @@ def test_seams_pass_through_the_thesis_true_points(scene: str, table: str, real_
 def test_any_dimensions_make_a_closed_solid_or_one_line_of_error(
     kind: str, sizes: list[float], width: float, depth: float, step: float, margin: float
 ) -> None:
-    cut = GrooveConfig(width=width, depth=depth, misalignment=step, margin=margin)
     try:
+        cut = GrooveConfig(width=width, depth=depth, misalignment=step, margin=margin)
         if kind == "cylinder":
             piece = make_cylinder(CylinderConfig(*sizes), cut)
         elif kind == "cuboid":
             piece = make_cuboid(CuboidConfig(*sizes[:3]), cut)
         else:
             piece = make_branched_plate(PlateConfig(*sizes[:3]), cut, BranchesConfig(junction=sizes[3]))
-    except SceneError as error:
+    except (SceneError, ConfigError) as error:
         refused = error
     else:
         refused = None

@@ -175,7 +175,7 @@ def folder(path: Path) -> Path:
         ("", "no points"),
         ("# nothing\n\n", "no points"),
         ("x,y,z\n", "no points"),
-        ("0,0,0\n", "all the same"),
+        ("0,0,0\n", "one point"),
         ("0,0,0\n0,0,0\n", "all the same"),
         ("0,0\n1,1\n", "line 1: 2 columns"),
         ("0,0,0\n1,1\n", "line 2: 2 columns, 3 before"),
@@ -209,12 +209,24 @@ def test_a_seam_off_the_part_is_refused_with_the_limit(tmp_path: Path) -> None:
     assert "no such file" in refused(config)
 
 
+def test_a_seam_in_another_unit_is_called_that_and_taken_with_its_unit_named(tmp_path: Path) -> None:
+    config = written(tmp_path, built_in("straight"))
+    table = np.loadtxt(tmp_path / "seam.csv", delimiter=",", skiprows=1)
+    metres = np.hstack([table[:, :3], table[:, -1:]]) * 1e-3
+    np.savetxt(tmp_path / "seam.csv", metres, delimiter=",")
+    said = refused(config)
+    assert "looks like metres" in said
+    assert "x [m], y [m], z [m]" in said
+    np.savetxt(tmp_path / "seam.csv", metres, delimiter=",", header="x [m],y [m],z [m],width [m]", comments="")
+    assert make_user_mesh(config).curve is not None
+
+
 def test_a_scene_says_which_part_it_has(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="give a table"):
         make_workpiece(SceneConfig(workpiece="mesh"))
     with pytest.raises(SceneError, match="write workpiece"):
         make_workpiece(SceneConfig(mesh=MeshConfig(file="a.stl", units="mm")))
-    with pytest.raises(ConfigError, match="units"):
+    with pytest.raises(ConfigError, match="units. is missing: one of m, cm, mm, inch"):
         structure({"workpiece": "mesh", "mesh": {"file": "a.stl"}}, SceneConfig)
     with pytest.raises(ConfigError, match="not one of m, cm, mm, inch"):
         structure({"workpiece": "mesh", "mesh": {"file": "a.stl", "units": "furlong"}}, SceneConfig)

@@ -133,7 +133,7 @@ def test_smallest_radius_is_that_of_the_curve(shape: str, radius: float) -> None
         ("plate ends at", {"line": CentreLineConfig(offset=0.11)}),
         ("margins", {"groove": GrooveConfig(margin=0.12)}),
         ("must be 0.2 to 500 mm", {"groove": GrooveConfig(width=0.0)}),
-        ("must be 0.2 to 500 mm", {"groove": GrooveConfig(depth=-0.001)}),
+        ("must be 0.2 to 500 mm", {"groove": GrooveConfig(depth=0.0001)}),
         ("cannot span", {"line": CentreLineConfig(shape="arc", radius=0.1)}),
         ("under half the groove's width", {"line": CentreLineConfig(shape="s", radius=0.006, wavelength=0.05)}),
         ("under 180", {"groove": GrooveConfig(angle=3.2)}),

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import SceneError
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import REACH, TURN, Metre, Radian, require_within
 from weldsim.scene.workpieces.base import LabelledMesh, SeamCurve
 from weldsim.scene.workpieces.groove import GrooveConfig, GrooveSection, make_section
 from weldsim.scene.workpieces.plate import FlatPlate, PlateConfig, check_depth
@@ -28,6 +28,9 @@ class BranchesConfig:
     branches: Literal[1, 3] = 3
     junction: Metre = 0.0
     spread: Radian = 2 * np.pi / 3
+
+    def __post_init__(self) -> None:
+        require_within(self, {"junction": REACH, "spread": TURN}, "branches")
 
 
 @final

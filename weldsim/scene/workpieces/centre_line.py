@@ -9,9 +9,10 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import SceneError
-from weldsim.quantity import Metre
+from weldsim.quantity import REACH, Metre, require_within
 
-RADII, WAVELENGTHS = (1e-3, 100.0), (0.01, 100.0)  # [m]
+FAR = (0.0, 10.0)  # [m] a bare number beyond was meant as millimetres; a radius of 10 m is straight on any plate
+RADII, WAVELENGTHS = (1e-3, FAR[1]), (0.01, FAR[1])  # [m]
 FARTHEST = 2.0  # [m] of the line from the plate's middle: no plate is larger
 
 
@@ -30,6 +31,9 @@ class CentreLineConfig:
     radius: Metre = 0.10
     wavelength: Metre = 0.30
     offset: Metre = 0.0
+
+    def __post_init__(self) -> None:
+        require_within(self, {"radius": FAR, "wavelength": FAR, "offset": REACH}, "centre_line")
 
 
 class CentreLine(ABC):

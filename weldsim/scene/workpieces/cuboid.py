@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from weldsim.errors import SceneError
 from weldsim.frames import unit
-from weldsim.quantity import Metre
+from weldsim.quantity import SIZE, Metre, require_within
 from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCurve, Workpiece, edge_places
 from weldsim.scene.workpieces.groove import GrooveConfig, GrooveSection, make_section
 from weldsim.scene.workpieces.solid import ABOVE, SWEEP_STEP, Surface, block, cut, sweep
@@ -28,6 +28,9 @@ class CuboidConfig:
     length: Metre = 0.420
     width: Metre = 0.200
     height: Metre = 0.330
+
+    def __post_init__(self) -> None:
+        require_within(self, {"length": SIZE, "width": SIZE, "height": SIZE}, "cuboid")
 
     @property
     def half(self) -> Float[ndarray, "3"]:

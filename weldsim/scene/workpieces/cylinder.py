@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import SceneError
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import SIZE, TURN, Metre, Radian, require_within
 from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCurve, Workpiece
 from weldsim.scene.workpieces.groove import GrooveConfig, GrooveSection, make_section
 from weldsim.scene.workpieces.solid import ABOVE, SWEEP_STEP, Surface, cut, sweep
@@ -31,6 +31,9 @@ class CylinderConfig:
     thickness: Metre = 0.020
     length: Metre = 0.200
     span: Radian = 64 / 180 * np.pi
+
+    def __post_init__(self) -> None:
+        require_within(self, {"radius": SIZE, "thickness": SIZE, "length": SIZE, "span": TURN}, "cylinder")
 
 
 @final

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import SceneError
-from weldsim.quantity import Metre, Radian
+from weldsim.quantity import REACH, SIZE, TURN, Metre, Radian, require_within
 
 SIZES = (0.2e-3, 0.5)  # [m] of what can be called a groove in a part
 
@@ -32,6 +32,10 @@ class GrooveConfig:
     root_gap: Metre | None = None
     misalignment: Metre = 0.0
     margin: Metre = 0.0
+
+    def __post_init__(self) -> None:
+        ranges = {"width": SIZE, "depth": SIZE, "root_gap": SIZE, "angle": TURN, "misalignment": REACH, "margin": REACH}
+        require_within(self, {name: limits for name, limits in ranges.items() if getattr(self, name) is not None}, "groove")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.errors import SceneError
-from weldsim.quantity import Metre
+from weldsim.quantity import SIZE, Metre, require_within
 from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCurve, Workpiece, edge_places
 from weldsim.scene.workpieces.centre_line import CentreLine, CentreLineConfig, make_centre_line
 from weldsim.scene.workpieces.groove import GrooveConfig, GrooveSection, make_section
@@ -28,6 +28,9 @@ class PlateConfig:
     length: Metre = 0.240
     width: Metre = 0.225
     thickness: Metre = 0.020
+
+    def __post_init__(self) -> None:
+        require_within(self, {"length": SIZE, "width": SIZE, "thickness": SIZE}, "plate")
 
     def checked(self) -> "PlateConfig":
         """Itself. Raises SceneError for a size that is not positive or over 2 m."""

@@ -56,7 +56,8 @@ def read_seam_file(path: Path, scale: float) -> SeamFile:
     moved = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0])
     numbers, points = numbers[moved], points[moved]
     if len(points) < 2:
-        raise SceneError(f"{path}: its points are all the same; a seam needs two", path=str(path))
+        which = "one point" if len(numbers) == len(rows) == 1 else "its points are all the same"
+        raise SceneError(f"{path}: {which}; a seam needs two", path=str(path))
     if table.names is None and table.width > len(AXES) and counts(numbers[:, 0].tolist()):
         raise SceneError(
             f"{path}, line {table.first + 1}: what would be x counts the rows; name the columns in a first line: id,x,y,z say",

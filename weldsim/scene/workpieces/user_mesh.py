@@ -21,6 +21,7 @@ from weldsim.scene.workpieces.triangles import column_runs, distance_to_faces, r
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254}
 READING = "mesh file/2"  # change it when files are read otherwise, so that kept meshes of old readings are left alone
+SHORTEST = 0.01  # of the part's longest side: a shorter seam must be in another unit
 LARGEST, SMALLEST = 2.0, 0.005  # [m] of a part's longest side: beyond, its unit must be wrong
 NEAR = 0.010  # [m] a seam of unknown width may be so far from the part's surface
 EVERY = 4  # samples of a seam between looks at the surface beside it
@@ -174,7 +175,16 @@ def _check_size(path: Path, vertices: Float[ndarray, "v 3"], units: str) -> None
 
 def _check_near(path: Path, seam: SeamFile, vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]) -> None:
     """Raises SceneError where the seam is farther from the surface than an opening can be."""
-    points = resample(seam.points, max(SWEEP_STEP, float(arc_length(seam.points)[-1]) / 100))
+    length, size = float(arc_length(seam.points)[-1]), float(np.ptp(vertices, axis=0).max())
+    if length < SHORTEST * size:
+        raise SceneError(
+            f"mesh.seam {path}: is {length * 1e3:.2g} mm long on a part of {size * 1e3:.4g} mm: looks like metres; a unit that"
+            " is not the mesh's goes with the names of the columns: x [m], y [m], z [m]",
+            path=str(path),
+            key="seam",
+            limit=SHORTEST * size,
+        )
+    points = resample(seam.points, max(SWEEP_STEP, length / 100))
     limit = NEAR if seam.width is None else float(seam.width.max()) / 2 + 1e-3
     distance = distance_to_faces(vertices, faces, points)
     if distance.max() > limit:
