@@ -53,8 +53,8 @@ class Plan(ConfigOptions):
     method: Method | None = None
     """Seam finder: ours (the default) or the published one."""
 
-    seam: int | None = None
-    """Which seam, counted from 1, the best one; by default all."""
+    seam: int | Literal["all"] | None = None
+    """Which seam, counted from 1, the best one; `all`, the default, takes every one."""
 
     near: Annotated[tuple[float, float, float] | None, quantities(POINT, "--near", words=3)] = None
     """The seam nearest to this point: metres, or each with its unit."""
@@ -107,7 +107,7 @@ class Plan(ConfigOptions):
                 raise InputError(f"--{name.replace('_', '-')}: belongs to a depth image; give its --intrinsics too", option=name)
         check_suffix(self.out, (".json",), "a path", others={".csv": "--csv"})
         check_suffix(self.csv, (".csv",), "a path as CSV", others={".json": "--out"})
-        if self.seam is not None and self.seam < 1:
+        if isinstance(self.seam, int) and self.seam < 1:
             raise InputError(f"--seam {self.seam}: seams are counted from 1", seam=self.seam)
         if page is not None and page.parent == self.report and not page.parent.exists():
             check_folder(nearest_folder(page), page)
@@ -187,9 +187,9 @@ class Plan(ConfigOptions):
 
         findings = result.findings
         everything = tuple(range(1, len(findings.seams) + 1))
-        if not everything or (self.seam is None and self.near is None):
+        if not everything or (self.seam in (None, "all") and self.near is None):
             return result, everything
-        index = pick(findings, self.seam, self.near)
+        index = pick(findings, self.seam if isinstance(self.seam, int) else None, self.near)
         if index in result.refused:
             raise PathError(f"{self.cloud}: seam {index + 1}: {result.refused[index]}", **result.refused[index].data)
         region = np.where(findings.region == index + 1, 1, 0)

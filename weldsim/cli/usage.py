@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
-from itertools import groupby, pairwise
+from itertools import groupby, pairwise, takewhile
 from typing import Any, get_args, get_origin
 
 import tyro
@@ -79,7 +79,6 @@ MEANT_COMMANDS = {
     **dict.fromkeys(("fault",), "controller fault"),
     **dict.fromkeys(("diagnose", "install", "info"), "doctor"),
     **dict.fromkeys(("version", "v"), "--version"),
-    "help": "--help",
 }
 """What people say for a command."""
 
@@ -119,6 +118,8 @@ def parse(words: Sequence[str]) -> Command | int:
     Raises:
         InputError: words that make no command; one line.
     """
+    if words and words[0] == "help":
+        words = [*words[1:], "--help"]
     if words and words[0] in HELP:
         print(overview(), end="")
         return 0
@@ -155,7 +156,7 @@ def one_line(box: str, words: Sequence[str]) -> str:
     paragraphs = groups or [[]]
     asked = paragraphs[0][:2] if "Required options" in box else paragraphs[0]
     message = " ".join(asked).partition(" Got errors:")[0].rstrip(".:") or "these words make no command"
-    message = re.sub(r"'None', ", "", message)
+    message = re.sub(r"'None', |, 'None'", "", message)
     name = next((word for word in words[:1] if word in COMMANDS), "")
     message = _said_better(f"{message[:1].lower()}{message[1:]}", name, words)
     return " ".join(f"{message}; see weldsim {name} --help".split())
@@ -163,23 +164,37 @@ def one_line(box: str, words: Sequence[str]) -> str:
 
 def _said_better(message: str, name: str, words: Sequence[str]) -> str:
     """tyro's message with what was meant, where that can be told."""
+    from weldsim.controller.fault_names import FaultName
+
     if match := _CHOICE.match(message):
         wrong, where, choices = match[1], match[2], re.findall(r"'([^']*)'", match[3])
+        choices = [one for one in get_args(FaultName) if one in choices] or choices  # tyro shuffles those that may be left out
         meant = _action_meant(name, wrong, words) if where == "action" else nearest(wrong, choices)
         return f"{where} {wrong!r} is not one of {', '.join(choices)}{f'; did you mean {meant}?' if meant else ''}"
     if match := _NUMBER.match(message):
-        if (name, match[1]) == ("run", "--seam"):
+        if match[1] == "--seam" and name in ("run", "plan"):
             return f"--seam {match[2]!r} is neither a whole number nor all"
+        if match[1] == "--seam" and match[2] == "all":
+            return f"--seam all: weldsim {name} welds one seam of a file at a time; give its number, 1 first"
         whole = "whole " if "int()" in message or "INT" in message else ""
         return f"{match[1]} {match[2]!r} is no {whole}number"
     if match := _MISSING.match(message):
-        return f"{match[1]}: {'its value is' if match[2] == '1' else f'its {match[2]} values are'} missing"
+        wanted, given = int(match[2]), _values_after(match[1], words)
+        if wanted == 1 or not given:
+            return f"{match[1]}: {'its value is' if wanted == 1 else f'its {wanted} values are'} missing"
+        return f"{match[1]} {' '.join(given)}: {len(given)} given, {wanted} needed"
     if message.startswith("unrecognized options: "):
         extra = message.removeprefix("unrecognized options: ").split(", ")
         setting = next((one for one, after in pairwise(words) if "=" in one and after == extra[0]), None)
         hint = f'; did you mean "{setting} {extra[0]}", in quotes?' if setting is not None else ""
         return f"{' '.join(extra)}: {'one word' if len(extra) == 1 else f'{len(extra)} words'} too many{hint}"
     return message
+
+
+def _values_after(option: str, words: Sequence[str]) -> list[str]:
+    """The words behind an option, up to the next one."""
+    behind = words[words.index(option) + 1 :] if option in words else []
+    return [*takewhile(lambda word: not re.match(r"--?[A-Za-z]", word), behind)]
 
 
 def _action_meant(name: str, wrong: str, words: Sequence[str]) -> str:

@@ -96,7 +96,12 @@ def test_the_option_meant_is_told_and_is_one(line, meant, capsys):
         ("plan --cloud a.ply", "weldsim plan a.ply"),
         ("run straight --set path.speed=6 mm/s", 'did you mean "path.speed=6 mm/s", in quotes?'),
         ("run straight curve", "curve: one word too many"),
-        ("plan a.ply --seam one", "--seam 'one' is no whole number"),
+        ("plan a.ply --seam one", "--seam 'one' is neither a whole number nor all"),
+        ("plan a.ply --near 0 -0.45", "--near 0 -0.45: 2 given, 3 needed"),
+        ("plan a.ply --viewpoint --json", "--viewpoint: its 3 values are missing"),
+        ("execute a.json --robot sim --seam one", "--seam 'one' is no whole number"),
+        ("execute a.json --robot sim --seam all", "welds one seam of a file at a time"),
+        ("controller fault protectivestop", "local-control, remote-control, recover; did you mean protective-stop?"),
         ("plan a.ply --seam 1.5", "--seam '1.5' is no whole number"),
         ("run straight --seed", "--seed: its value is missing"),
         ("run straight --sensor kinekt", "did you mean kinect?"),
@@ -243,3 +248,17 @@ def test_a_finder_is_loaded_by_name(tmp_path, monkeypatch):
     (tmp_path / "own_finder_c.py").write_text("raise RuntimeError('no licence')\n")
     with pytest.raises(InputError, match="RuntimeError: no licence"):
         load_finder("own_finder_c:find")
+
+
+def test_help_is_a_command_too(capsys):
+    assert main(["help"]) == 0
+    overview = capsys.readouterr().out
+    assert main(["--help"]) == 0
+    assert capsys.readouterr().out == overview
+    assert main(["help", "scan"]) == 0
+    assert "usage: weldsim scan" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("words", "seam"), [("plan a.ply --seam all", "all"), ("plan a.ply --seam 2", 2), ("plan a.ply", None)])
+def test_all_seams_may_be_asked_for_by_name(words, seam):
+    assert parse(words.split()).seam == seam  # type: ignore[union-attr]

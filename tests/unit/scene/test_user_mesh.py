@@ -226,7 +226,7 @@ def test_a_scene_says_which_part_it_has(tmp_path: Path) -> None:
         make_workpiece(SceneConfig(workpiece="mesh"))
     with pytest.raises(SceneError, match="write workpiece"):
         make_workpiece(SceneConfig(mesh=MeshConfig(file="a.stl", units="mm")))
-    with pytest.raises(ConfigError, match="units. is missing: one of m, cm, mm, inch"):
+    with pytest.raises(ConfigError, match=r"units. is missing: one of m, cm, mm, inch"):
         structure({"workpiece": "mesh", "mesh": {"file": "a.stl"}}, SceneConfig)
     with pytest.raises(ConfigError, match="not one of m, cm, mm, inch"):
         structure({"workpiece": "mesh", "mesh": {"file": "a.stl", "units": "furlong"}}, SceneConfig)
