@@ -16,6 +16,7 @@ from weldsim.dryrun.margins import joint_speeds
 from weldsim.dryrun.verdict import DryRun, Fix, Trial, Verdict, runs
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, SPEED_LIMIT
 from weldsim.output import write_whole
+from weldsim.report.figures import shade_arc
 from weldsim.report.html import DRAW, POLICY, STYLE
 from weldsim.report.style import BAD, GRID, INK, JOINTS
 
@@ -131,10 +132,7 @@ def _plot(drawn: list[dict[str, Any]], title: str, t: ndarray, values: ndarray, 
         {**word, "y": edge, "yanchor": anchor, "text": f"limit {edge:+.0f}"}
         for edge, anchor in ((limit, "top"), (-limit, "bottom"))
     ]
-    if trial.arc_on.any():
-        on = trial.t[trial.arc_on]
-        band = {"type": "rect", "xref": "x", "yref": "paper", "x0": float(on[0]), "x1": float(on[-1]), "y0": 0, "y1": 1}
-        layout["shapes"].append({**band, "fillcolor": "rgba(228,87,46,0.07)", "line": {"width": 0}, "layer": "below"})
+    shade_arc(layout, trial.t, trial.arc_on)
     data = [
         {
             "type": "scatter",

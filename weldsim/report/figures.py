@@ -22,6 +22,8 @@ CLOUD_LIMIT = 60_000  # points drawn
 LONGEST = 1.0  # side of the scene, in units of plotly's camera
 SEEN = 0.76 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
 WIDER = 1.6  # how much wider than high a scene is on a narrow page
+POLE = 0.05  # [m] height of the mark where a weld was stopped, over the seam
+TICKS = 10  # on the longest side of the scene, fewer on shorter ones: they have to stand apart
 LINE_LIMIT = 3000  # samples drawn of one line
 
 
@@ -60,9 +62,13 @@ def scene(
     data += [_line("known seam", k.opening_B, KNOWN, 4, legend=i == 0) for i, k in enumerate(known)]
     for i, log in enumerate(log for log in logs if log.arc_on.any()):
         data.append(_line("executed tip", _thin(log.X_BT_act.p[log.arc_on]), LINES["executed"], 3, legend=i == 0))
-    if stopped_B is not None:
-        data.append(_dots("stopped here", np.array([stopped_B]), {"size": 9, "color": BAD, "symbol": "x"}) | {"showlegend": True})
-    box = np.concatenate([points, groove, *(torch_axes(path).reshape(-1, 3) for path in paths if path is not None)])
+    flag = np.empty((0, 3))
+    if stopped_B is not None:  # on a pole: on the seam itself the lines would hide it
+        flag = np.array(stopped_B) + np.array([[0.0], [POLE]]) * X_BS.R[:, 2]
+        data.append(_line("stopped here", flag, BAD, 8, legend=False))
+        mark = _dots("stopped here", flag[1:], {"size": 7, "color": BAD, "symbol": "diamond"})
+        data.append(mark | {"mode": "markers+text", "text": ["stopped"], "textposition": "top center", "textfont": {"color": BAD}})
+    box = np.concatenate([points, groove, flag, *(torch_axes(path).reshape(-1, 3) for path in paths if path is not None)])
     shape, eye = _fitted(box, unit(0.9 * X_BS.R[:, 2] - 0.75 * X_BS.R[:, 1]), X_BS.R[:, 2])
     axis = {"backgroundcolor": "#f7f9fa", "gridcolor": GRID, "showbackground": True, "color": SOFT, "tickfont": {"size": 10}}
     axis |= {"zeroline": False, "showspikes": False}
@@ -70,7 +76,10 @@ def scene(
     del layout["xaxis"], layout["yaxis"]
     layout |= {
         "scene": {
-            **{f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}} for name in "xyz"},
+            **{
+                f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}, "nticks": max(3, round(TICKS * side / LONGEST))}
+                for name, side in zip("xyz", shape, strict=True)
+            },
             "aspectmode": "manual",
             "aspectratio": _xyz(shape),
             "camera": {"eye": _xyz(eye), "up": _xyz(X_BS.R[:, 2])},
@@ -198,11 +207,13 @@ def torch_speed(log: ExecutionLog, path: TorchPath, config: ReportConfig, stoppe
         x = units.to_mm(stopped)
         mark = {"type": "line", "xref": "x", "yref": "paper", "x0": x, "x1": x, "y0": 0, "y1": 1}
         layout["shapes"] = [{**mark, "line": {"color": BAD, "width": 2, "dash": "dash"}}]
+        first, last = units.to_mm(float(path.s[0])), units.to_mm(float(path.s[-1]))
+        side = "left" if x < (first + last) / 2 else "right"  # where there is room for the words
         layout["annotations"] = [
-            {"x": x, "y": 1, "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False}
+            {"x": x, "y": 0.5, "yref": "paper", "xanchor": side, "yanchor": "middle", "showarrow": False}
             | {"text": f"stopped at {x:.1f} mm", "font": {"size": 12, "color": BAD}}
         ]
-        layout["xaxis"]["range"] = [units.to_mm(float(path.s[0])), units.to_mm(float(path.s[-1]))]
+        layout["xaxis"]["range"] = [first, last]
     return {"data": data, "layout": layout}
 
 
@@ -211,14 +222,26 @@ def joints(log: ExecutionLog, which: str, names: tuple[str, ...]) -> Figure:
     values = {"q": np.rad2deg(log.q_act), "qd": np.rad2deg(log.qd_act), "torque": log.torque}[which]
     label = {"q": "joint angle [deg]", "qd": "joint speed [deg/s]", "torque": "joint torque [Nm]"}[which]
     layout = _layout("time [s]", label)
-    if log.arc_on.any():
-        on = log.t[log.arc_on]
-        band = {"type": "rect", "xref": "x", "yref": "paper", "x0": float(on[0]), "x1": float(on[-1]), "y0": 0, "y1": 1}
-        layout["shapes"] = [{**band, "fillcolor": "rgba(228,87,46,0.07)", "line": {"width": 0}, "layer": "below"}]
+    shade_arc(layout, log.t, log.arc_on)
     t = _thin(log.t)
     columns = () if values is None else values.T
     data = [_trace(name, t, _thin(column), colour, width=1.5) for name, column, colour in zip(names, columns, JOINTS, strict=False)]
     return {"data": data, "layout": layout}
+
+
+def shade_arc(layout: Figure, t: ndarray, arc_on: ndarray) -> None:
+    """Every spell of a burning arc shaded in the layout of a plot over time, and its axis says so.
+
+    Args:
+        layout: changed in place.  t: (n,) instants [s].  arc_on: (n,) whether the arc burns.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], arc_on, [False]]).astype(int)))
+    for first, past in edges.reshape(-1, 2):
+        band = {"type": "rect", "xref": "x", "yref": "paper", "x0": float(t[first]), "x1": float(t[past - 1]), "y0": 0, "y1": 1}
+        style = {"fillcolor": "rgba(228,87,46,0.07)", "line": {"width": 0}, "layer": "below"}
+        layout.setdefault("shapes", []).append({**band, **style})
+    if len(edges):
+        layout["xaxis"]["title"] = {"text": "time [s]; arc on where shaded"}
 
 
 def _layout(x: str, y: str, height: int = 300) -> Figure:

@@ -24,6 +24,7 @@ h1{font-size:26px;margin:0}h2{font-size:17px;margin:0 0 10px}p{margin:4px 0;colo
 .verdict{padding:10px 20px;border-radius:8px;color:#fff;font-weight:700;font-size:20px;white-space:nowrap}
 .good{background:var(--good)}.amber{background:var(--amber)}.bad{background:var(--bad)}.plain{background:var(--plain)}
 .reasons{border-left:4px solid var(--bad);margin:0 0 16px;padding:10px 16px 10px 32px;background:#fff}
+.reasons.look{border-left-color:var(--amber)}
 .cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(132px,1fr));gap:12px;margin-bottom:16px}
 .card,section{background:#fff;border:1px solid var(--line);border-radius:8px;padding:14px 16px}
 .card b{display:block;font-size:18px;white-space:nowrap}.card span{color:var(--soft);font-size:13px}
@@ -34,6 +35,8 @@ table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 th{text-align:left;color:var(--soft);font-weight:600;font-size:13px}
 th,td{padding:5px 10px 5px 0;border-bottom:1px solid var(--line);vertical-align:top}
 tr:last-child td{border-bottom:0}.num{white-space:nowrap}
+.checks{align-items:start}.checks table{table-layout:fixed}.checks .num{white-space:normal}
+.checks th:first-child{width:42%}.checks th:last-child{width:14%}
 .mark{white-space:nowrap;font-weight:600}.mark.ok{color:var(--good)}.mark.no{color:var(--bad)}.mark.look{color:var(--amber)}
 .bar{height:10px;background:#7d9bb8;border-radius:3px;min-width:2px}
 footer{color:var(--soft);font-size:13px;overflow-wrap:anywhere}
@@ -76,7 +79,7 @@ def write_html(
     """
     config = config or ReportConfig()
     drawn: list[figures.Figure] = []
-    body = [_header(report, findings, config), _cards(report, findings), _checks(checks(report, config))]
+    body = [_header(report, findings, config), _cards(report, findings, welded), _checks(checks(report, config))]
     driven = tuple(each for each in (log, *(others or {}).values()) if each is not None)
     scene = figures.scene(cloud, findings, paths, driven, known, stopped_place(report))
     body.append(_figure(drawn, "Cloud, seam and torch path", scene))
@@ -155,16 +158,18 @@ def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) ->
     return (
         f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"
         f'<div class="verdict {look(word)}">{escape(word)}</div></header>'
-        + (f'<ul class="reasons">{listed}</ul>' if listed else "")
+        + (f'<ul class="reasons{" look" if report.passed else ""}">{listed}</ul>' if listed else "")
     )
 
 
-def _cards(report: WeldReport, findings: SeamFindings) -> str:
-    """The handful of numbers that are read first."""
-    cards: list[tuple[str, str]] = [(str(len(findings.seams)), "seams found")]
+def _cards(report: WeldReport, findings: SeamFindings, welded: int) -> str:
+    """The handful of numbers that are read first; of several seams, those of the first that was welded."""
+    count = len(findings.seams)
+    cards: list[tuple[str, str]] = [(str(count), "seam found" if count == 1 else "seams found")]
     if findings.seams:
-        seam = findings.seams[0]
-        cards.append((f"{units.to_mm(seam.length):.1f} mm", "length"))
+        index = welded if welded < count else 0
+        seam = findings.seams[index]
+        cards.append((f"{units.to_mm(seam.length):.1f} mm", "length" if count == 1 else f"length of seam {index + 1}"))
         if seam.width > 0:  # a method that measures none leaves 0
             cards.append((f"{units.to_mm(seam.width):.1f} mm", "width of the opening"))
         if seam.step:
@@ -199,7 +204,7 @@ def _checks(listed: tuple[Check, ...]) -> str:
         rows.append(f"<tr>{figure}{amber if c.passed and c.amber else marks[c.passed]}</tr>")
     half = -(-len(rows) // 2)
     tables = "".join(_table(("figure", "value", "limit", ""), part) for part in (rows[:half], rows[half:]) if part)
-    return f'<section><h2>Figures and limits</h2><div class="two">{tables}</div></section>'
+    return f'<section><h2>Figures and limits</h2><div class="two checks">{tables}</div></section>'
 
 
 def _seams(findings: SeamFindings) -> str:

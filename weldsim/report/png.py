@@ -35,7 +35,8 @@ from weldsim.report.view import (
 )
 
 EMPTY = "#eef1f4"
-OBLIQUE = np.array([0.25, 0.55])
+OBLIQUE = np.array([[0.25, 0.55], [0.0, 0.6], [-0.25, 0.55]])  # how a millimetre of height is drawn; tried in order
+ASLANT = 0.3  # sine of the angle to the seams from which on a wire stands out from them
 LAYER = 0.03  # [m] points this far below another in their pixel are hidden by it
 RATIO = 0.72  # height of the plan view over its width
 PIXEL = 1e-3  # [m] of the plan view
@@ -57,7 +58,8 @@ def write_png(
     figure = Figure(figsize=(16, 9), dpi=100, facecolor="white")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, top=0.86, bottom=0.08, width_ratios=(1.75, 1), hspace=0.34, wspace=0.16)
-    _headline(figure, report, findings, config or ReportConfig())
+    welded = welded if welded < len(findings.seams) else 0
+    _headline(figure, report, findings, welded, config or ReportConfig())
     surface = shows_surface(cloud, findings.seams)
     plane = plane_of(cloud, findings.seams, welded)
     plan = figure.add_subplot(grid[:, 0])
@@ -71,6 +73,9 @@ def write_png(
         else:
             _speed(upper, log, paths[welded], config or ReportConfig())
         _along(lower, findings, paths, log, known, welded)
+        if len(findings.seams) > 1:
+            for axes in (upper, lower):
+                axes.set_title(f"{axes.get_title(loc='left')}, seam {welded + 1}", loc="left", fontsize=13, color=INK)
     else:
         _refused(upper, findings)
         lower.set_axis_off()
@@ -79,8 +84,8 @@ def write_png(
     return write_whole(path, buffer.getvalue())
 
 
-def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config: ReportConfig) -> None:
-    """Scene, verdict and what decided it, over the whole width."""
+def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, welded: int, config: ReportConfig) -> None:
+    """Scene, verdict and what decided it, over the whole width; of several seams, the figures of the one that was welded."""
     word, why = verdict(report, len(findings.seams), config)
     figure.text(0.05, 0.945, f"{report.scene}", fontsize=20, weight="bold", color=INK, va="center")
     figure.text(
@@ -96,8 +101,8 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, config
     count = len(findings.seams)
     facts = [f"{count} seam{'' if count == 1 else 's'}", f"method {report.method}"]
     if count:
-        seam = findings.seams[0]
-        facts.append(f"{units.to_mm(seam.length):.1f} mm long")
+        seam = findings.seams[welded]
+        facts.append(f"{'' if count == 1 else f'seam {welded + 1}: '}{units.to_mm(seam.length):.1f} mm long")
         facts += [f"{units.to_mm(seam.width):.1f} mm wide"] if seam.width > 0 else []  # 0: the method measures none
         facts += [f"confidence {seam.confidence:.2f}"] if seam.confidence > 0 else []
     figure.text(0.05, 0.905, "   |   ".join(facts), fontsize=12, color=SOFT, va="center")
@@ -126,16 +131,17 @@ def _plan_view(
     else:
         axes.set_anchor("N")
     many = len(findings.seams) > 1
+    oblique = _oblique(plane, findings)
     for i, (seam, path) in enumerate(zip(findings.seams, paths, strict=False)):
         for k, side in enumerate(side for side in (seam.left_B, seam.right_B) if side is not None):
             _trace(axes, plane, side, LIPS, 1.2, "--", "lips" if i == k == 0 else None)
         if path is None:
             _trace(axes, plane, seam.points_B, EMPTY, 1.6, ":", None)
-            _number(axes, plane, seam.points_B, f"{i + 1}: no path" if many else "no path")
+            _number(axes, plane, seam.points_B, f"{i + 1}: no path" if many else "no path", oblique)
             continue
         # Seen along the normal a wire is a dot: its height is drawn obliquely, as in a cabinet projection.
         ends = 1e3 * plane.arrows(torch_axes(path))
-        wires = ends[:, :, :2] + (ends[:, :, 2:] - ends[:, :1, 2:]) * OBLIQUE
+        wires = ends[:, :, :2] + (ends[:, :, 2:] - ends[:, :1, 2:]) * oblique
         axes.add_collection(
             LineCollection(list(wires), colors=WIRE, linewidths=1.1, label="wire, drawn obliquely" if i == 0 else None)
         )
@@ -144,7 +150,7 @@ def _plan_view(
         tip = path.X_BT.p[path.weld]
         _ends(axes, plane, tip, legend=i == 0)
         if many:
-            _number(axes, plane, tip, f"{i + 1}")
+            _number(axes, plane, tip, f"{i + 1}", oblique)
     axes.set_xlabel("along [mm]", color=INK)
     enlarged = "" if flat else f", {RATIO * np.ptp(window[:, 0]) / np.ptp(window[:, 1]):.0f} x as large"
     axes.set_ylabel(f"across{enlarged} [mm]", color=INK)
@@ -192,16 +198,27 @@ def _stop(axes: Axes, plane: Plane, place_B: ndarray, s: float) -> None:
     axes.plot([x], [y], "x", color=BAD, ms=15, mew=4, zorder=6)
     text = f"stopped at {units.to_mm(s):.1f} mm"
     style = {"boxstyle": "round,pad=0.25", "fc": "white", "ec": BAD}
-    axes.annotate(text, (x, y), xytext=(10, -26), textcoords="offset points", color=BAD, weight="bold", fontsize=12, bbox=style)
+    leader = {"arrowstyle": "-", "color": BAD, "lw": 1.2}
+    words = {"color": BAD, "weight": "bold", "fontsize": 12, "ha": "center", "bbox": style, "arrowprops": leader, "zorder": 8}
+    axes.annotate(text, (x, y), xytext=(0, -80), textcoords="offset points", **words)  # below seam and wires
 
 
-def _number(axes: Axes, plane: Plane, points_B: ndarray, text: str) -> None:
+def _oblique(plane: Plane, findings: SeamFindings) -> ndarray:
+    """The direction that heights are drawn in, (2,): the first that no seam runs along, or the one farthest from all of them."""
+    lines = [np.diff(plane.points(seam.points_B[[0, -1]])[:, :2], axis=0)[0] for seam in findings.seams]
+    along = np.array([line / np.hypot(*line) for line in lines if np.hypot(*line) > 1e-6]).reshape(-1, 2)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    sines = (np.abs(across @ OBLIQUE.T) / np.linalg.norm(OBLIQUE, axis=1)).min(axis=0, initial=1.0)
+    return OBLIQUE[int(np.argmax(sines >= min(ASLANT, sines.max())))]
+
+
+def _number(axes: Axes, plane: Plane, points_B: ndarray, text: str, oblique: ndarray) -> None:
     """`text` beside the middle of a line, where its wires are not: seams that meet have their ends in one place."""
     middle = len(points_B) // 2
     here, there = 1e3 * plane.points(points_B[[middle, min(middle + 1, len(points_B) - 1)]])[:, :2]
     ahead = there - here
     aside = np.array([-ahead[1], ahead[0]]) / max(float(np.hypot(*ahead)), 1e-9)
-    aside = aside if aside @ OBLIQUE < 0 else -aside
+    aside = aside if aside @ oblique < 0 else -aside
     halo = [withStroke(linewidth=3, foreground="white")]
     look = {"color": SEAM, "weight": "bold", "fontsize": 14, "path_effects": halo, "zorder": 7, "ha": "center", "va": "center"}
     axes.annotate(text, here, xytext=tuple(20 * aside), textcoords="offset points", **look)

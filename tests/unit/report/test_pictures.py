@@ -18,7 +18,7 @@ from weldsim.report import figures
 from weldsim.report.html import write_html
 from weldsim.report.limits import ReportConfig
 from weldsim.report.plane import Seen, Unrolled, plane_of
-from weldsim.report.png import _plan_view, write_png
+from weldsim.report.png import OBLIQUE, _oblique, _plan_view, write_png
 from weldsim.report.view import cross_section, error_lines, heights, shown, shows_surface, torch_axes, view_frame
 from weldsim.report.weld import weld_report
 
@@ -228,3 +228,76 @@ def test_a_seed_is_told_where_there_is_one(tmp_path: Path) -> None:
     known = weld_report(FOUND, (PATH,), scene="sine", known=(KNOWN,), seed=0)
     assert ", seed 0</p>" in write_html(tmp_path / "a.html", known, CLOUD, FOUND, (PATH,)).read_text()
     assert ", seed " not in write_html(tmp_path / "b.html", replace(known, seed=None), CLOUD, FOUND, (PATH,)).read_text()
+
+
+def test_what_was_said_in_amber_is_marked_in_amber(tmp_path: Path) -> None:
+    amber = replace(REPORT, warnings=("torch speed 40 % of the one asked for",))
+    assert amber.passed
+    assert '<ul class="reasons look"><li>torch speed' in write_html(tmp_path / "a.html", amber, CLOUD, FOUND, (PATH,)).read_text()
+    failed = replace(REPORT, passed=False, reasons=("too far",))
+    assert '<ul class="reasons"><li>too far' in write_html(tmp_path / "b.html", failed, CLOUD, FOUND, (PATH,)).read_text()
+
+
+def test_of_several_seams_the_figures_say_whose_they_are(tmp_path: Path) -> None:
+    """Length and width at the top are those of the seam that was welded."""
+    half = len(SEAM.s) // 2
+    short = found_seam(KNOWN, np.zeros(len(KNOWN.s)))
+    short = replace(
+        short,
+        points_B=short.points_B[:half],
+        s=short.s[:half],
+        tangents_B=short.tangents_B[:half],
+        normals_B=short.normals_B[:half],
+        left_B=None,
+        right_B=None,
+        sigma=None,
+    )
+    both = SeamFindings(seams=(SEAM, short), region=INSIDE.astype(np.int32))
+    report = weld_report(both, (PATH, None), scene="sine")
+    text = write_html(tmp_path / "a.html", report, CLOUD, both, (PATH, torch_path(short)), welded=1).read_text()
+    assert f"<b>{1e3 * short.length:.1f} mm</b><span>length of seam 2</span>" in text
+    assert "<span>length</span>" in write_html(tmp_path / "b.html", REPORT, CLOUD, FOUND, (PATH,)).read_text()
+    assert write_png(tmp_path / "a.png", report, CLOUD, both, (PATH, torch_path(short)), welded=1).stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_a_stop_is_marked_over_the_seam_and_its_words_are_inside(share: float) -> None:
+    s = share * float(PATH.s[-1])
+    place = PATH.X_BT.p[int(share * (len(PATH.s) - 1))]
+    drawn = figures.scene(CLOUD, FOUND, (PATH,), (LOG,), (), (place[0], place[1], place[2]))
+    go.Figure(drawn)
+    pole, mark = [trace for trace in drawn["data"] if trace["name"] == "stopped here"]
+    assert pole["type"] == mark["type"] == "scatter3d"
+    assert mark["text"] == ["stopped"]
+    speed = figures.torch_speed(LOG, PATH, ReportConfig(), s)
+    assert speed is not None
+    (words,) = speed["layout"]["annotations"]
+    assert words["xanchor"] == ("left" if share < 0.5 else "right")
+    assert words["text"] == f"stopped at {1e3 * s:.1f} mm"
+
+
+def test_each_spell_of_the_arc_is_shaded() -> None:
+    t, on = np.arange(10.0), np.array([0, 1, 1, 0, 0, 1, 0, 1, 1, 1], bool)
+    layout = figures.joints(replace(LOG, arc_on=np.zeros(len(LOG.t), bool)), "q", ("a",) * 6)["layout"]
+    assert "shapes" not in layout
+    assert layout["xaxis"]["title"]["text"] == "time [s]"
+    figures.shade_arc(layout, t, on)
+    assert [(band["x0"], band["x1"]) for band in layout["shapes"]] == [(1.0, 2.0), (5.0, 5.0), (7.0, 9.0)]
+    assert "arc on where shaded" in layout["xaxis"]["title"]["text"]
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 60.0, 66.0, 90.0, 114.0, 150.0])
+def test_wires_are_not_drawn_along_a_seam(angle: float) -> None:
+    """Wires of a level seam are drawn as ever; where another seam runs that way, another direction is taken."""
+    turn = matrix_from_rotation_vector(np.array([0.0, 0.0, np.deg2rad(angle)]))
+    line = np.stack([np.linspace(0, 0.1, 50), np.zeros(50), np.zeros(50)], axis=1)
+    normals = np.tile([0.0, 0.0, 1.0], (50, 1))
+    along = np.tile([1.0, 0.0, 0.0], (50, 1))
+    seams = tuple(Seam(points_B=line @ R.T, s=line[:, 0], tangents_B=along @ R.T, normals_B=normals) for R in (np.eye(3), turn))
+    plane = Seen(X_BS=Transform("BS", np.eye(3), np.zeros(3)))
+    found = _oblique(plane, SeamFindings(seams=seams, region=np.zeros(0, np.int32)))
+    for seam in seams:
+        ahead = seam.points_B[-1, :2] / np.linalg.norm(seam.points_B[-1, :2])
+        assert abs(ahead[0] * found[1] - ahead[1] * found[0]) / np.linalg.norm(found) > 0.25
+    if angle < 40:
+        np.testing.assert_array_equal(found, OBLIQUE[0])
