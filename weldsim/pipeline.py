@@ -271,7 +271,7 @@ def _found(find: Finder, cloud: PointCloud) -> SeamFindings:
         answer = find(cloud)
     except (WeldsimError, KeyboardInterrupt, MemoryError):
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"finder {name}: raised {type(error).__name__}: {error}", finder=name) from error
     return findings_from(answer, cloud, name)
 

@@ -40,6 +40,8 @@ def load_toml(path: str | Path) -> dict[str, Any]:
     Raises:
         ConfigError: the file is missing, unreadable, not UTF-8 or not TOML (with the line).
     """
+    if not isinstance(path, str | Path):
+        raise ConfigError(f"config: {path!r:.60} is no TOML file; its path, or tables, are wanted")
     try:
         return tomllib.loads(Path(path).read_bytes().decode())
     except FileNotFoundError:
@@ -62,6 +64,7 @@ def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
 
 def with_sources(data: Mapping[str, Any], source: Source, overrides: Iterable[str]) -> tuple[dict[str, Any], dict[str, Source]]:
     """`apply_overrides`, and where each value that is now in the tables came from: `source`, or the command line."""
+    overrides = (overrides,) if isinstance(overrides, str) else overrides  # one may be given alone
     result: dict[str, Any] = deepcopy(dict(data))
     given = dict.fromkeys(leaves(result), source)
     for text in overrides:

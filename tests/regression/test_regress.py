@@ -20,6 +20,7 @@ from weldsim.records import PointCloud, SeamFindings
 from weldsim.regression import Golden, Regression, default_golden, read_golden, regress, updated, write_golden
 from weldsim.regression.golden import Entry
 from weldsim.regression.recorded import figures_of_cloud, read_known_seam
+from weldsim.regression.text import refusals
 from weldsim.seam.find import find_seams
 
 pytestmark = pytest.mark.render
@@ -70,6 +71,17 @@ def test_a_finder_of_ones_own_is_judged_as_ours(outcome):
     rows = timeless(outcome)
     assert rows[0] == rows[2]
     assert rows[3] == rows[5]
+
+
+def test_why_a_finder_of_ones_own_gave_nothing_is_said_once_a_reason(outcome):
+    said = "finder mine: raised ValueError: no luck"
+    rows = [
+        replace(row, figures=replace(row.figures, method=method, seed=seed, refused=said))
+        for row in outcome.of("straight", "profile")
+        for method, seed in (("mine", 0), ("mine", 2), ("thesis", 0))
+    ]
+    assert refusals(replace(outcome, rows=tuple(rows))) == [f"straight, mine, seeds 0, 2: {said}"]
+    assert refusals(outcome) == []
 
 
 def test_figures_do_not_depend_on_processes(outcome):

@@ -132,6 +132,25 @@ def test_a_camera_that_there_is_not_is_no_other_camera():
     assert "sensor 'd416' is not one of d415, d435, d415-stereo, kinect, exact" in done.stdout
 
 
+def test_what_is_no_path_is_refused_in_one_line() -> None:
+    """In a process of its own: here the tests' own type check would come first."""
+    program = """
+import weldsim
+for call in (weldsim.load_config, weldsim.load_scene, weldsim.read_cloud):
+    try:
+        call(5)
+    except weldsim.WeldsimError as error:
+        print(error)
+print(weldsim.load_config(None, 'path.speed=6 mm/s').path.speed)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    config, scene, cloud, speed = done.stdout.splitlines()
+    assert "5 is no TOML file" in config
+    assert "the name of one or a TOML file is wanted" in scene
+    assert "5 is no file" in cloud
+    assert speed == "0.006"
+
+
 CLOUD = PointCloud(points=POINTS)
 LINE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0]])
 
@@ -159,9 +178,15 @@ def boom(cloud: PointCloud) -> SeamFindings:
     raise KeyError("threshold")
 
 
+def leaves(cloud: PointCloud) -> SeamFindings:
+    """A finder that ends the program."""
+    raise SystemExit(3)
+
+
 @pytest.mark.parametrize(
     ("find", "says"),
     [
+        (leaves, "finder leaves: raised SystemExit: 3"),
         (boom, "finder boom: raised KeyError: 'threshold'"),
         (lambda cloud: 7, "returned an int; SeamFindings, a Seam, several, or (n, 3) points are wanted"),
         (lambda cloud: "straight", "returned a str"),

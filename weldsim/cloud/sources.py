@@ -13,6 +13,8 @@ def read_bytes(path: str | Path) -> bytes:
     Raises:
         CloudFileError: missing, a folder or device, empty, over 4 GB, or not ours to read.
     """
+    if not isinstance(path, str | Path):
+        raise CloudFileError(f"{path!r:.60} is no file; the path of one is wanted", reason="no file")
     where = Path(path)
 
     def refuse(reason: str) -> CloudFileError:

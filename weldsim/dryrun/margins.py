@@ -9,7 +9,7 @@ from weldsim.dryrun.margin import Margin
 from weldsim.dryrun.verdict import Trial
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
 from weldsim.motion.arm import dexterity
-from weldsim.motion.collision import NEAR
+from weldsim.motion.collision import NEAR, in_words
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rungs import SINGULAR
 
@@ -33,7 +33,7 @@ def _clearance(trial: Trial, cell: Cell) -> Margin:
     gaps = [cell.collision.nearest(trial.q[row]) for row in rows]
     worst = min(range(len(rows)), key=lambda i: gaps[i][0])
     gap, first, second = gaps[worst]
-    bodies = f"{first} from {second}" if first else ""
+    bodies = f"{in_words(first)} from {in_words(second)}" if first else ""
     return Margin(
         figure="clearance of arm and torch",
         value=1e3 * gap,

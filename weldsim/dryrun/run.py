@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
 from weldsim.dryrun.margins import margins
@@ -12,6 +14,7 @@ from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import DryRun
 from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.motion.config import MotionConfig
+from weldsim.scene.cell import TABLE
 
 
 def dry_run(
@@ -42,5 +45,16 @@ def dry_run(
         told = partial(tell, "fixes")
         fixes.append(fixes_for_path(followed, trial, cell, config, told, given=program.given) if fix else ())
     trials = [replace(trial, margins=margins(trial, cell, config)) for trial in trials]
-    notes = (*program.notes, *cell.notes)
+    notes = (*program.notes, *cell.notes, *_beside_table(program, cell))
     return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=notes)
+
+
+def _beside_table(program: Program, cell: Cell) -> list[str]:
+    """Seams that lie beyond the table's edges, where the cell does not say what would hold a part there; one sentence each."""
+    notes = []
+    for path, name in zip(program.paths, program.names, strict=True):
+        places = path.X_BT.p[path.weld][:, :2]
+        beyond = float(np.maximum(TABLE[0] - places, places - TABLE[1]).max())
+        if beyond > 0 and not cell.has_part:
+            notes.append(f"{name} goes {1e3 * beyond:.0f} mm beyond the table's edge; what holds the part there is not known")
+    return notes

@@ -25,7 +25,15 @@ class Touch:
     depth: float
 
     def __str__(self) -> str:
-        return f"{self.first} touches {self.second} ({1e3 * self.depth:.1f} mm deep)" if self.second else self.first
+        first, second = in_words(self.first), in_words(self.second)
+        return f"{first} touches {second} ({1e3 * self.depth:.1f} mm deep)" if second else first
+
+
+def in_words(name: str) -> str:
+    """A body's name as people say it: of a part in pieces the part; clamps and bolts keep theirs, `fixture.without` takes it."""
+    if name.startswith("part_collision_"):
+        return "part"
+    return name if name.startswith("clamp_") else name.replace("_", " ")
 
 
 class CellCollision:

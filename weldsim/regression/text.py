@@ -5,6 +5,7 @@ import statistics
 from weldsim import units
 from weldsim.regression.distribution import EVERY_SCENE, FALSE_ALARMS, Shift
 from weldsim.regression.figures import FIGURES, Figures
+from weldsim.regression.finders import METHODS
 from weldsim.regression.golden import Deviation
 from weldsim.regression.suite import Regression
 
@@ -109,3 +110,16 @@ def rows_of_text(outcome: Regression) -> list[list[str]]:
                 cells.append(ends[0] if same else " / ".join(ends))
             out.append([scene, method, f"{hit}/{known}", *cells, standing(outcome, scene, method)])
     return out
+
+
+def refusals(outcome: Regression) -> list[str]:
+    """Why a finder of the user's own has no plan, or none along a seam; one line for each scene, method and reason."""
+    seeds: dict[tuple[str, str, str], list[int]] = {}
+    for row in outcome.rows:
+        f = row.figures
+        if f.refused and f.method not in METHODS:
+            seeds.setdefault((f.scene, f.method, f.refused), []).append(f.seed)
+    return [
+        f"{scene}, {method}, seed{'s'[: len(found) > 1]} {', '.join(map(str, found))}: {reason}"
+        for (scene, method, reason), found in seeds.items()
+    ]

@@ -26,12 +26,25 @@ def scene_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in scenes_folder().glob("*.toml")))
 
 
+OTHERS = (
+    (
+        (".stl", ".obj"),
+        'a mesh, no scene; write a TOML file beside it: workpiece = "mesh", and under [mesh] file = "{name}", units = "mm"',
+    ),
+    ((".ply", ".pcd", ".xyz", ".npz", ".npy", ".ptx"), "a cloud, no scene; did you mean weldsim plan {path}?"),
+    ((".json", ".csv", ".script", ".urscript"), "a path or program, no scene; did you mean weldsim dry-run {path}?"),
+)
+"""What is given for a scene, and what to do with it."""
+
+
 def scene_path(name: str | Path) -> Path:
     """The TOML file of a known scene, or of a path to the user's own.
 
     Raises:
         SceneError: neither a known name nor a file.
     """
+    if not isinstance(name, str | Path):
+        raise SceneError(f"scene: {name!r} is none; the name of one or a TOML file is wanted", allowed=scene_names())
     path = Path(name)
     if path.suffix == ".toml":
         if path.is_file():
@@ -39,6 +52,8 @@ def scene_path(name: str | Path) -> Path:
         raise SceneError(f"scene {str(name)!r}: no such file", scene=str(name), allowed=scene_names())
     if str(name) in scene_names():
         return scenes_folder() / f"{name}.toml"
+    if said := next((said for suffixes, said in OTHERS if path.suffix.lower() in suffixes), ""):
+        raise SceneError(f"{name} is {said.format(name=path.name, path=name)}", scene=str(name), allowed=scene_names())
     beside = path.with_name(f"{path.name}.toml")
     meant = str(beside) if beside.is_file() else nearest(str(name), scene_names())
     raise SceneError(

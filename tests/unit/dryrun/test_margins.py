@@ -60,7 +60,8 @@ def test_clearance_is_the_distance_of_the_nearest_bodies(passed: DryRun, cell: C
     model, data = cell.model, mujoco.MjData(cell.model)
     data.qpos[:6] = trial.q[row]
     mujoco.mj_kinematics(model, data)
-    names = {name: model.geom(f"{name}_collision").id for name in margin.of.split(" from ") if "part" not in name}
+    bodies = [body.replace(" ", "_") for body in margin.of.split(" from ") if body != "part"]
+    names = {name: model.geom(f"{name}_collision").id for name in bodies}
     part = model.geom("part_collision_0").id
     assert len(names) == 1
     distance = mujoco.mj_geomDistance(model, data, next(iter(names.values())), part, 1.0, np.zeros(6))

@@ -52,6 +52,13 @@ def test_a_scene_whose_part_stands_in_the_base_is_refused(job, capsys) -> None:
     assert "inside the arm's base" in capsys.readouterr().err
 
 
+def test_a_seam_beside_the_table_is_told_where_nothing_is_known_to_hold_it(job, capsys) -> None:
+    main(["dry-run", job, "--roll", "--no-fix", "--move", "0 mm, -420 mm"])
+    assert "job goes 30 mm beyond the table's edge; what holds the part there is not known" in capsys.readouterr().out
+    main(["dry-run", job, "--roll", "--no-fix"])
+    assert "beyond the table's edge" not in capsys.readouterr().out
+
+
 def test_a_part_that_hangs_in_the_air_is_told(job, capsys) -> None:
     hanging = ("--set", "scene.fixture.stand=false", "--set", 'scene.pose.clearance="10 mm"', "--set", "scene.fixture.clamps=0")
     main(["dry-run", job, "--scene", "straight", "--roll", "--no-fix", *hanging])
