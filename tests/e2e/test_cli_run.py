@@ -250,7 +250,7 @@ def test_one_of_several_seams_names_the_way_to_all_of_them(capsys):
     report = replace(report, tracking_p95=1e-5)
     Run(scene="y_branches")._print(report, ReportConfig(), 3, ())
     said = capsys.readouterr().out
-    assert "PASSED WITH WARNINGS, 1 of 3 seams welded; all 1 limits kept" in said.splitlines()[0]
+    assert "PASSED WITH WARNINGS, 1 of 3 seams welded; the one limit kept" in said.splitlines()[0]
     assert "--seam all welds every one" in said
     assert main(["run", "y_branches", "--seam", "al"]) == 2
     assert "all" in capsys.readouterr().err

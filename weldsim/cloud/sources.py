@@ -22,7 +22,8 @@ def read_bytes(path: str | Path) -> bytes:
 
     try:
         if where.is_dir():
-            raise refuse("is a folder, a file is needed")
+            inside = where / "cloud.ply"  # of a run directory
+            raise refuse(f"is a folder; did you mean {inside}?" if inside.is_file() else "is a folder, a file is needed")
         if not where.exists():
             raise refuse("no such file")
         if not where.is_file():

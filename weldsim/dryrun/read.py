@@ -47,6 +47,7 @@ def read_program(
         InputError: a file that is missing, malformed, in millimetres, with numbers that are not finite, or too short.
     """
     path = Path(path)
+    _refuse_others(path)
     _refuse_unused(path, tool, base, roll_free)
     if path.suffix.lower() == ".json":
         document = read_path_json(path)
@@ -67,9 +68,17 @@ def read_program(
     text = _text(path)
     if path.suffix.lower() in SCRIPTS:
         return parse_script(text, source=str(path), X_FT=None if tool is None else _mount(tool), q_start=q_start)
-    if path.suffix.lower() in TABLES:
-        return _csv(path, text, tool, base, speed, bool(roll_free))
-    raise InputError(f"{path}: .json (weldsim.path/1), .csv (UR poses) or .script (URScript) is needed", path=str(path))
+    return _csv(path, text, tool, base, speed, bool(roll_free))
+
+
+def _refuse_others(path: Path) -> None:
+    """Raises InputError for a folder, or a file of another kind."""
+    wanted = ".json (weldsim.path/1), .csv (UR poses) or .script (URScript) is needed"
+    if path.is_dir():
+        inside = path / "path.json"  # of a run directory
+        raise InputError(f"{path}: is a folder; {f'did you mean {inside}?' if inside.is_file() else wanted}", path=str(path))
+    if path.suffix.lower() not in (".json", *SCRIPTS, *TABLES):
+        raise InputError(f"{path}: {wanted}", path=str(path))
 
 
 def _refuse_unused(path: Path, tool: Tool | None, base: Base, roll_free: bool | None) -> None:

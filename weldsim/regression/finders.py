@@ -48,6 +48,8 @@ def load_finder(name: str) -> tuple[str, Finder]:
         dotted = name.rpartition(".")
         if not meant and dotted[0] and not name.endswith(".py"):
             meant = f"{dotted[0]}:{dotted[2]}"
+        if name.endswith(".py"):
+            meant = f"{name}:FUNCTION"
         raise InputError(
             f"method {name!r} is not one of {', '.join(METHODS)}, nor package.module:function"
             + (f"; did you mean {meant}?" if meant else ""),

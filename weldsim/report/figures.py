@@ -20,7 +20,7 @@ from weldsim.report.view import CrossSection, ErrorLine, height_range, heights, 
 Figure = dict[str, Any]
 CLOUD_LIMIT = 60_000  # points drawn
 LONGEST = 1.0  # side of the scene, in units of plotly's camera
-SEEN = 0.76 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
+SEEN = 0.68 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
 WIDER = 1.6  # how much wider than high a scene is on a narrow page
 POLE = 0.05  # [m] height of the mark where a weld was stopped, over the seam
 TICKS = 10  # on the longest side of the scene, fewer on shorter ones: they have to stand apart

@@ -88,7 +88,7 @@ def write_html(
     for index, each in logs.items():
         here = stopped if index == list(logs)[-1] else None  # the job ended there
         plots = _plots(drawn, cloud, findings, paths, each, known, index, joint_names, config, here)
-        title = f"<h2>Seam {index + 1}</h2>" if len(logs) > 1 else ""
+        title = f"<h2>Seam {index + 1}</h2>" if len(findings.seams) > 1 else ""
         body.append(f'{title}<div class="two">{"".join(plots)}</div>')
     body.append(f'<div class="two">{_seams(findings)}{_refused(findings)}{_threshold(findings.threshold)}{_timing(report)}</div>')
     body.append(_footer(report))

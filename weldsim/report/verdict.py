@@ -22,7 +22,7 @@ def verdict(report: WeldReport, found: int, config: ReportConfig) -> tuple[str, 
     if not report.passed:
         first, *others = report.reasons
         return FAILED, part + first + (f" (and {len(others)} more)" if others else "")
-    kept = f"all {judged} limits kept"
+    kept = "the one limit kept" if judged == 1 else f"all {judged} limits kept"
     if report.unjudged and report.plan is None:
         return UNJUDGED, f"no known seam to compare with; {found} found" + (f", {kept}" if judged else "")
     if not judged:

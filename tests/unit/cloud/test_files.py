@@ -238,7 +238,10 @@ def test_what_is_no_cloud_is_refused_in_one_line(put, name: str) -> None:
 def test_what_is_no_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(CloudFileError, match="no such file"):
         read_cloud(tmp_path / "missing.ply")
-    with pytest.raises(CloudFileError, match="is a folder"):
+    with pytest.raises(CloudFileError, match="is a folder, a file is needed"):
+        read_cloud(tmp_path)
+    (tmp_path / "cloud.ply").touch()  # as in a run directory
+    with pytest.raises(CloudFileError, match=r"is a folder; did you mean .*cloud\.ply\?"):
         read_cloud(tmp_path)
     with pytest.raises(CloudFileError, match="no regular file"):
         read_cloud("/dev/null")

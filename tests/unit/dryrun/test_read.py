@@ -363,3 +363,16 @@ def test_polyscopes_own_file_is_named_for_what_it_is(tmp_path):
     (tmp_path / "weld.urp").write_bytes(b"\x1f\x8b\x08")
     with pytest.raises(InputError, match=r"is PolyScope's own; the \.script"):
         read_program(tmp_path / "weld.urp")
+
+
+def test_a_run_directory_is_answered_with_the_path_in_it(tmp_path):
+    with pytest.raises(InputError, match=r"is a folder; \.json"):
+        read_program(tmp_path)
+    (tmp_path / "path.json").write_text(json.dumps(_document()))
+    with pytest.raises(InputError, match="did you mean") as caught:
+        read_program(tmp_path)
+    meant = str(caught.value).partition("did you mean ")[2].removesuffix("?")
+    assert read_program(meant).names == ("seam-1",)
+    (tmp_path / "cloud.ply").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match=r"cloud\.ply: \.json .* is needed"):
+        read_program(tmp_path / "cloud.ply")
