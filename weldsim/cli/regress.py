@@ -200,13 +200,11 @@ class Regress(ConfigOptions):
         }
 
     def _print(self, outcome: "Regression", path: Path, written: list[Path]) -> None:
-        from weldsim.regression.text import HEAD, refusals, rows_of_text, sentence, shift_sentence, unjudged
+        from weldsim.regression.text import HEAD, counted, refusals, rows_of_text, sentence, shift_sentence, unjudged
 
         print(table(rows_of_text(outcome), HEAD))
-        where = (
-            f"{len(outcome.rows)} plans in {outcome.seconds:.1f} s with {outcome.jobs} process{'es' if outcome.jobs > 1 else ''}"
-        )
-        print(f"  {where}; median / worst of {outcome.seeds} seed{'s' if outcome.seeds > 1 else ''}")
+        where = f"{counted(len(outcome.rows), 'plan')} in {outcome.seconds:.1f} s with {counted(outcome.jobs, 'process')}"
+        print(f"  {where}; median / worst of {counted(outcome.seeds, 'seed')}")
         for line in refusals(outcome):
             print(f"  {line}")
         for row in outcome.rows:

@@ -9,7 +9,7 @@ from weldsim.output import write_whole
 from weldsim.regression.figures import FIGURES
 from weldsim.regression.job import Row
 from weldsim.regression.suite import Regression
-from weldsim.regression.text import HEAD, number, rows_of_text, sentence, shift_sentence, unjudged
+from weldsim.regression.text import HEAD, counted, number, rows_of_text, sentence, shift_sentence, unjudged
 from weldsim.report.html import STYLE
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
@@ -29,8 +29,8 @@ def page(outcome: Regression) -> str:
     """The HTML text; it asks nothing of any network."""
     word, look = ("NOT WORSE", "good") if outcome.passed else ("WORSE", "bad")
     facts = (
-        f"{len(outcome.scenes)} scenes, {len(outcome.methods)} methods, {outcome.seeds} seeds, {outcome.jobs} processes,"
-        f" {outcome.seconds:.0f} s; weldsim {__version__}"
+        f"{counted(len(outcome.scenes), 'scene')}, {counted(len(outcome.methods), 'method')}, {counted(outcome.seeds, 'seed')},"
+        f" {counted(outcome.jobs, 'process')}, {outcome.seconds:.0f} s; weldsim {__version__}"
     )
     said = [*map(sentence, outcome.deviations), *map(shift_sentence, outcome.shifts), *filter(None, [unjudged(outcome)])]
     listed = "".join(f"<li>{escape(text)}</li>" for text in said)

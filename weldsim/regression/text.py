@@ -112,6 +112,11 @@ def rows_of_text(outcome: Regression) -> list[list[str]]:
     return out
 
 
+def counted(count: int, word: str) -> str:
+    """ "1 seed", "3 seeds"."""
+    return f"{count} {word if count == 1 else f'{word}es' if word.endswith('s') else f'{word}s'}"
+
+
 def refusals(outcome: Regression) -> list[str]:
     """Why a finder of the user's own has no plan, or none along a seam; one line for each scene, method and reason."""
     seeds: dict[tuple[str, str, str], list[int]] = {}

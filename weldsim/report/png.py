@@ -185,8 +185,9 @@ def _surface(figure: Figure, axes: Axes, points: ndarray, height: ndarray, findi
 def _window(points_S: ndarray, seams_S: list[ndarray]) -> ndarray:
     """Lowest and highest corner of the plan view [m]: around the seams, or the cloud, in the shape of the page."""
     ours = np.concatenate(seams_S)[:, :2] if seams_S else points_S[:, :2]
-    low, high = (ours.min(axis=0), ours.max(axis=0)) if seams_S else np.percentile(ours, [1, 99], axis=0)
-    size = high - low + 2 * MARGIN / (1 if seams_S else 4)
+    low, high = (ours.min(axis=0), ours.max(axis=0)) if seams_S else np.percentile(ours, [10, 90], axis=0)
+    # Of a cloud without a seam most: a floor far behind the part would leave it a corner.
+    size = high - low + 2 * MARGIN if seams_S else 1.5 * (high - low)
     width = max(size[0], size[1] / RATIO)
     half = np.array([width, RATIO * width]) / 2
     return np.stack([(low + high) / 2 - half, (low + high) / 2 + half])

@@ -18,7 +18,7 @@ from weldsim.report import figures
 from weldsim.report.html import write_html
 from weldsim.report.limits import ReportConfig
 from weldsim.report.plane import Seen, Unrolled, plane_of
-from weldsim.report.png import OBLIQUE, _oblique, _plan_view, write_png
+from weldsim.report.png import OBLIQUE, _oblique, _plan_view, _window, write_png
 from weldsim.report.view import cross_section, error_lines, heights, shown, shows_surface, torch_axes, view_frame
 from weldsim.report.weld import weld_report
 
@@ -301,3 +301,15 @@ def test_wires_are_not_drawn_along_a_seam(angle: float) -> None:
         assert abs(ahead[0] * found[1] - ahead[1] * found[0]) / np.linalg.norm(found) > 0.25
     if angle < 40:
         np.testing.assert_array_equal(found, OBLIQUE[0])
+
+
+def test_a_floor_far_behind_does_not_push_the_part_into_a_corner() -> None:
+    rng = np.random.default_rng(3)
+    part, floor = rng.uniform(-0.2, 0.2, (9500, 3)), rng.uniform(1.0, 2.0, (500, 3))
+    low, high = _window(np.concatenate([part, floor]), [])
+    assert (low < -0.15).all()
+    assert (high > 0.15).all()
+    assert (high - low < 0.7).all()
+    low, high = _window(part, [])
+    assert (low < -0.2).all()
+    assert (high > 0.2).all()
