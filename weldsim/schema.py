@@ -260,7 +260,7 @@ def _table_dumper(cls: Any) -> Callable[[Any], Any]:
     return make_dict_unstructure_fn(cls, CONVERTER, **_omitted(cls))
 
 
-def _faults(error: BaseException, path: str, cl: type | None = None) -> Iterable[tuple[str, dict[str, Any]]]:
+def _faults(error: BaseException, path: str, cl: Any = None) -> Iterable[tuple[str, dict[str, Any]]]:
     """(message, data) of every leaf of a cattrs error, each message led by its dotted path. Args: cl, whose field is at fault."""
     for note in getattr(error, "__notes__", ()):
         if isinstance(note, AttributeValidationNote):
@@ -282,7 +282,7 @@ def _faults(error: BaseException, path: str, cl: type | None = None) -> Iterable
             )
     elif isinstance(error, KeyError):
         dotted = f"{path}.{error.args[0]}".lstrip(".") if not path.endswith(str(error.args[0])) else path
-        hint = None if cl is None else get_type_hints(cl, include_extras=True).get(str(error.args[0]))
+        hint = None if not isinstance(cl, type) else get_type_hints(cl, include_extras=True).get(str(error.args[0]))
         wanted = f": one of {', '.join(map(str, get_args(hint)))}" if get_origin(hint) is Literal else ""
         yield f"key {dotted!r} is missing{wanted}", {"key": dotted}
     else:

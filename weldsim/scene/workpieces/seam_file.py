@@ -53,10 +53,11 @@ def read_seam_file(path: Path, scale: float) -> SeamFile:
     numbers = np.array([row for row in rows if row is not None])
     points = np.stack([numbers[:, i] * scales[name] for i, name in enumerate(column) if name in AXES], axis=1)
     _refuse_commas(path, table, numbers, column)
+    count = len(points)
     moved = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0])
     numbers, points = numbers[moved], points[moved]
     if len(points) < 2:
-        which = "one point" if len(numbers) == len(rows) == 1 else "its points are all the same"
+        which = "one point" if count == 1 else "its points are all the same"
         raise SceneError(f"{path}: {which}; a seam needs two", path=str(path))
     if table.names is None and table.width > len(AXES) and counts(numbers[:, 0].tolist()):
         raise SceneError(
