@@ -1,12 +1,12 @@
 """What is wrong with a path as it is written, whatever the arm: speed, jumps of orientation, travel that turns back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.dryrun.verdict import Why
+from weldsim.dryrun.verdict import Verdict, Why
 from weldsim.frames import Transform
 from weldsim.motion.collision import Touch
 from weldsim.motion.config import MotionConfig
@@ -30,6 +30,12 @@ class Fault:
     why: Why
     text: str
     touch: Touch | None = None
+
+
+def failing(verdict: Verdict, fault: Fault) -> Verdict:
+    """The verdict on a pose that fails so."""
+    first, second, depth = ("", "", 0.0) if fault.touch is None else (fault.touch.first, fault.touch.second, fault.touch.depth)
+    return replace(verdict, why=fault.why, text=fault.text, first=first, second=second, depth=depth)
 
 
 def path_faults(path: TorchPath, config: MotionConfig) -> list[Fault]:

@@ -3,14 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.dryrun.cell import Cell
-from weldsim.dryrun.path_faults import Fault, path_faults
+from weldsim.dryrun.path_faults import Fault, failing, path_faults
+from weldsim.dryrun.sections import kept_poses
 from weldsim.dryrun.verdict import Trial, Verdict, Why
 from weldsim.errors import MotionError
-from weldsim.frames import Transform
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
@@ -53,18 +53,13 @@ def _all(path: TorchPath) -> tuple[Verdict, ...]:
     return tuple(Verdict(label=f"pose {i}", index=i, s=float(s)) for i, s in enumerate(path.s))
 
 
-def _failing(verdict: Verdict, fault: Fault) -> Verdict:
-    first, second, depth = ("", "", 0.0) if fault.touch is None else (fault.touch.first, fault.touch.second, fault.touch.depth)
-    return replace(verdict, why=fault.why, text=fault.text, first=first, second=second, depth=depth)
-
-
 def _ended(path: TorchPath, faults: list[Fault]) -> tuple[Verdict, ...]:
     """Verdicts of a motion that ends at the first of these faults: the poses after it are not reached, but for the others."""
     first = min(fault.index for fault in faults)
     late = {"why": "not reached", "text": f"the motion ends at pose {first}"}
     verdicts = [replace(verdict, **late) if verdict.index > first else verdict for verdict in _all(path)]  # type: ignore[arg-type]
     for fault in faults:
-        verdicts[fault.index] = _failing(_all(path)[fault.index], fault)
+        verdicts[fault.index] = failing(_all(path)[fault.index], fault)
     return tuple(verdicts)
 
 
@@ -97,23 +92,11 @@ def _spoilt(base: Trial, path: TorchPath, start: Fault | None, faults: list[Faul
     )
 
 
-def _poses(path: TorchPath, kept: Bool[ndarray, "n"]) -> TorchPath:
-    """The path with some of its poses."""
-    return TorchPath(
-        X_BT=Transform("BT", path.X_BT.R[kept], path.X_BT.p[kept]),
-        s=path.s[kept],
-        speed=path.speed[kept],
-        arc_on=path.arc_on[kept],
-        segments=tuple(segment for segment, keep in zip(path.segments, kept, strict=True) if keep),
-        roll_free=path.roll_free,
-    )
-
-
 def _refusals(path: TorchPath, cell: Cell, config: MotionConfig) -> list[Fault]:
     """The poses that no posture will do for, each taken alone."""
     moved = np.concatenate([[True], np.diff(path.s) > 1e-9])
     try:
-        rail = make_rail(_poses(path, moved), config)
+        rail = make_rail(kept_poses(path, moved), config)
     except MotionError:
         return []
     mine = rail.index >= 0
@@ -150,11 +133,11 @@ def _refused(base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, s_first: fl
     for i, k in enumerate(nearest):
         mine = rungs.refusals[int(k)]
         if mine is not None and path.s[i] >= s_first - 1e-9:
-            verdicts[i] = _failing(verdicts[i], Fault(index=i, why=mine.why, text=mine.text, touch=mine.touch))
+            verdicts[i] = failing(verdicts[i], Fault(index=i, why=mine.why, text=mine.text, touch=mine.touch))
     lead = "" if rail.start <= s_first <= rail.end else f" on the {'lead-in' if s_first < rail.start else 'lead-out'}"
     index = rail.path_index(s_first)
     text = f"s = {1e3 * s_first:.1f} mm{lead}: {_said(refusal.why, refusal.text, refusal.options, rail)}"
-    verdicts[index] = _failing(verdicts[index], Fault(index=index, why=refusal.why, text=text, touch=refusal.touch))
+    verdicts[index] = failing(verdicts[index], Fault(index=index, why=refusal.why, text=text, touch=refusal.touch))
     before = int(np.searchsorted(rungs.s, s_first, side="right")) - 1
     return replace(
         base,
@@ -185,12 +168,14 @@ def _failed(base: Trial, path: TorchPath, error: MotionError, rungs: Rungs, cell
     s = float(str(error.data.get("s", path.s[0])))
     index = int(np.abs(path.s - s).argmin())
     why: Why = error.data.get("why", "collision")  # type: ignore[assignment]
+    until = float(str(error.data.get("until", s)))
     split, q = error.data.get("split", ()), error.data.get("q", ())
     q_worst = np.array(q) if isinstance(q, tuple) and len(q) == 6 else _last_posture(rungs, int(np.abs(rungs.s - s).argmin()))
     touch = cell.collision.touch(q_worst) if why == "collision" and q_worst is not None else None
+    there = np.flatnonzero((path.s >= s - 1e-9) & (path.s <= until + 1e-9)).tolist()
     return replace(
         base,
-        verdicts=_ended(path, [Fault(index=index, why=why, text=str(error), touch=touch)]),
+        verdicts=_ended(path, [Fault(index=i, why=why, text=str(error), touch=touch) for i in sorted({index, *there})]),
         s_worst=s,
         q_worst=q_worst,
         p_worst=path.X_BT.p[index],
@@ -221,7 +206,7 @@ def _planned(base: Trial, path: TorchPath, plan: MotionPlan, config: MotionConfi
     verdicts = list(_all(path))
     for index, share in slow.items():
         text = f"joint limits allow {100 * share:.0f} % of the {1e3 * asked:.0f} mm/s asked for {limits}"
-        verdicts[index] = _failing(verdicts[index], Fault(index=index, why="speed", text=text))
+        verdicts[index] = failing(verdicts[index], Fault(index=index, why="speed", text=text))
     first = min(slow)
     return replace(out, verdicts=tuple(verdicts), s_worst=plan.slowest_at if len(slow) == 1 else None, p_worst=path.X_BT.p[first])
 

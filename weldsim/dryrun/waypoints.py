@@ -8,6 +8,7 @@ import numpy as np
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.path_faults import FASTEST
 from weldsim.dryrun.scatter import Refit, Scatter, refit, scatter_of
+from weldsim.dryrun.sections import with_every_failure
 from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.verdict import Trial, Verdict
 from weldsim.motion.config import MotionConfig
@@ -27,24 +28,32 @@ def try_waypoints(path: TorchPath, name: str, cell: Cell, config: MotionConfig) 
     no such curve within tolerance mends is a failure.
     """
     trial = try_path(path, name, cell, config)
-    if not _worth_refitting(path, trial):
+    if trial.passed:
         return path, trial
     scatter = scatter_of(path)
-    tried = [(fitted, _tried(fitted, path, name, cell, config)) for fitted in _fits(path, scatter, config)[:1]]
+    rough = bool(_scattered(scatter))
+    fits = _fits(path, scatter, config)[:1] if _worth_refitting(path, trial) else []
+    tried = [(fitted, try_path(fitted.path, name, cell, config)) for fitted in fits]
     if not tried:
-        return path, trial
+        return path, with_every_failure(trial, path, cell, config, rough=rough)
     if not tried[0][1].passed:
         tried += [
-            (fitted, _tried(fitted, path, name, cell, config))
+            (fitted, try_path(fitted.path, name, cell, config))
             for fitted in (refit(path, scatter, share) for share in SMOOTHER)
             if _within(fitted, scatter)
         ]
     better = next(((fitted, one) for fitted, one in tried if one.passed), None)
-    if better is None:
-        return path, _truer(trial, tried[0][1], _scattered(scatter))
-    fitted, best = better
-    notes = (*_told(path, fitted, scatter, trial), *best.notes)
-    return fitted.path, replace(best, notes=notes)
+    if better is not None:
+        fitted, best = better
+        notes = (*_told(path, fitted, scatter, trial), *best.notes)
+        return fitted.path, replace(_of_waypoints(best, fitted, path), notes=notes)
+    fitted, smooth = tried[0]
+    if _fail_alike(trial, _of_waypoints(smooth, fitted, path)):
+        worse = with_every_failure(trial, path, cell, config, rough=rough)
+    else:  # the reason of the one that is followed exactly comes from the scatter
+        worse = _of_waypoints(with_every_failure(smooth, fitted.path, cell, config), fitted, path)
+    said = f"{_scattered(scatter)}no smooth curve within that passes either"
+    return path, replace(worse, notes=(*worse.notes, said)) if rough else worse
 
 
 def _worth_refitting(path: TorchPath, trial: Trial) -> bool:
@@ -68,9 +77,8 @@ def _within(fitted: Refit, scatter: Scatter) -> bool:
     )
 
 
-def _tried(fitted: Refit, path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Trial:
-    """The curve tried, with a verdict for each waypoint: that of the first of its own poses that fails."""
-    trial = try_path(fitted.path, name, cell, config)
+def _of_waypoints(trial: Trial, fitted: Refit, path: TorchPath) -> Trial:
+    """The trial of a curve with a verdict for each waypoint of the path: that of the first of its own poses that fails."""
     owner = np.abs(fitted.path.s[:, None] - fitted.path.s[fitted.nearest][None, :]).argmin(axis=1)
     worst: dict[int, Verdict] = {}
     for verdict in trial.verdicts:
@@ -85,12 +93,10 @@ def _tried(fitted: Refit, path: TorchPath, name: str, cell: Cell, config: Motion
     return replace(trial, verdicts=tuple(verdicts))
 
 
-def _truer(trial: Trial, fitted: Trial, said: str) -> Trial:
-    """Of two trials that fail the one whose reason does not come from the scatter: the smooth one's, unless both fail alike."""
-    a, b = trial.failure, fitted.failure
-    same = a is None or b is None or (a.why == b.why and abs(a.index - b.index) <= 1)
-    kept = trial if same else fitted
-    return replace(kept, notes=(*kept.notes, f"{said}no smooth curve within that passes either")) if said else kept
+def _fail_alike(a: Trial, b: Trial) -> bool:
+    """Whether two trials fail for one reason at one pose, or next to it."""
+    first, second = a.failure, b.failure
+    return first is None or second is None or (first.why == second.why and abs(first.index - second.index) <= 1)
 
 
 def _scattered(scatter: Scatter) -> str:

@@ -160,15 +160,30 @@ def _follow_piece(
 
 
 def check_clear(paths: list[JointPath], blocked: Blocked) -> None:
-    """Raises LostPathError at the first configuration of the swept motion that touches something; `data`: s, reason."""
+    """Raises LostPathError at the first configuration of the swept motion that touches something; `data` as of `first_contact`."""
     for path in paths:
-        start, end = float(path.spline.x[0]), float(path.spline.x[-1])
-        s = np.linspace(start, end, max(2, int(np.ceil((end - start) / STEP_LENGTH)) + 1))
-        found = first_touch(path.spline(s), blocked)
+        found = first_contact(path.spline, float(path.spline.x[0]), float(path.spline.x[-1]), blocked)
         if found is not None:
-            at = float(np.interp(found[0], np.arange(len(s)), s))
-            q = posture_at(path.spline(s), found[0])
-            raise LostPathError(f"s = {1e3 * at:.1f} mm: {found[1]}", s=at, reason=found[1], q=tuple(q))
+            raise found
+
+
+def first_contact(q_of_s: CubicSpline, start: float, end: float, blocked: Blocked) -> LostPathError | None:
+    """The first configuration from arc length `start` to `end` [m] that touches something, as an error; None where none does.
+
+    `data`: s; reason; q [rad]; until, the arc length of the last sample in a row that touches something [m].
+    """
+    s = np.linspace(start, end, max(2, int(np.ceil((end - start) / STEP_LENGTH)) + 1))
+    q = q_of_s(s)
+    found = first_touch(q, blocked)
+    if found is None:
+        return None
+    at = until = float(np.interp(found[0], np.arange(len(s)), s))
+    for k in range(int(found[0]) + 1, len(s)):
+        if blocked(q[k]) is None:
+            break
+        until = float(s[k])
+    text = f"s = {1e3 * at:.1f} mm: {found[1]}"
+    return LostPathError(text, s=at, reason=found[1], q=tuple(posture_at(q, found[0])), until=until)
 
 
 def _strayed(

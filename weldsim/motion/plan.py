@@ -1,5 +1,6 @@
 """Torch path to joint trajectory: choose how to hold the arm, follow the path, time it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from weldsim.motion.air import air_moves
 from weldsim.motion.arm import clearances, dexterity, kinematic_model
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.cut import cut_path
-from weldsim.motion.follow import JointPath, LostPathError, check_clear, follow
+from weldsim.motion.follow import JointPath, LostPathError, check_clear, first_contact, follow
 from weldsim.motion.ladder import Hold, climb, near
 from weldsim.motion.rail import Rail, make_rail
 from weldsim.motion.refuse import refused, unreachable
@@ -23,6 +24,12 @@ from weldsim.motion.timing import Move, piece_move
 from weldsim.records import JointTrajectory, Segment, TorchPath
 
 LONG_RAMP = 0.002  # [m] a ramp worth a note
+LOST = {  # why a path cannot be followed, by the reason told: all else is something touched
+    "branch flip": "joint jump",
+    "joint limit": "joint limit",
+    "rough path": "orientation jump",
+    "out of reach": "unreachable",
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -148,7 +155,13 @@ def _in_one(
 ) -> MotionPlan:
     """The plan of a path in a single sweep, from q_start and in the end to q_home, where that is given."""
     rail = make_rail(path, config)
-    hold, paths, moves = _first_that_holds(rail, q_start, q_home, arm, config, blocked, rungs)
+    if blocked is not None and (touch := blocked(q_start)) is not None:
+        raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch, why="stale start")
+
+    def timed(paths: list[JointPath]) -> list[Move]:
+        return _moves(rail, paths, q_start, q_home, arm, config, blocked)
+
+    hold, paths, moves = first_that_holds(rail, q_start, arm, config, blocked, rungs, timed)
     q = np.concatenate([path.spline(path.spline.x) for path in paths])
     clearance = float(clearances(q, config.floor, arm.X_FT).min())
     weld = next(move for move in moves if move.segment == Segment.WELD)
@@ -176,21 +189,25 @@ def _in_one(
     )
 
 
-def _first_that_holds(
+def first_that_holds(
     rail: Rail,
     q_start: Float[ndarray, "6"],
-    q_home: Float[ndarray, "6"] | None,
     arm: Arm,
     config: MotionConfig,
     blocked: Blocked | None,
-    rungs: Rungs | None,
+    rungs: Rungs | None = None,
+    timed: Callable[[list[JointPath]], list[Move]] = lambda paths: [],
 ) -> tuple[Hold, list[JointPath], list[Move]]:
-    """The best way to hold the arm that can be followed all along and reached through the air, with its joint paths and moves.
+    """The best way to hold the arm that can be followed all along, with its joint paths and what `timed` makes of them.
 
     Where a climb is lost between its rungs, the nodes about that place are given up and the next best one is tried.
+
+    Args:
+        q_start: near which the arm is best held [rad].  rungs: of the rail, where they have been made already.
+        timed: raises LostPathError where the joint paths will not do, as where the air is barred.
+    Raises:
+        MotionError: none is found; `data`: index, s, reason, why; until, where what is touched on the way is left again [m].
     """
-    if blocked is not None and (touch := blocked(q_start)) is not None:
-        raise MotionError(f"start: {touch}; drive the arm clear before planning", reason=touch, why="stale start")
     rungs, model = rungs or make_rungs(rail, arm, config, blocked), kinematic_model(arm)
     banned = np.zeros(rungs.cost.shape, bool)
     lost: list[LostPathError] = []
@@ -202,10 +219,15 @@ def _first_that_holds(
             paths = follow(rail, hold.q[0], hold.rest, model, arm, config)
             if blocked is not None:
                 check_clear(paths, blocked)
-            return hold, paths, _moves(rail, paths, q_start, q_home, arm, config, blocked)
+            return hold, paths, timed(paths)
         except LostPathError as error:
-            lost.append(error)
-            banned |= near(rungs, hold, float(str(error.data["s"])), reach=1 + attempt)
+            s = float(str(error.data["s"]))
+            # A path that is lost on the way has not been checked up to there: what it touches before counts as its end.
+            met = None
+            if blocked is not None and error.data["reason"] in LOST:
+                met = first_contact(hold.rest, float(hold.s[0]), s, blocked)
+            lost.append(met or error)
+            banned |= near(rungs, hold, s, reach=1 + attempt)
     if not lost:
         raise refused(rail, rungs, arm, config, blocked)
     furthest = max(lost, key=lambda error: float(str(error.data["s"])))
@@ -213,7 +235,7 @@ def _first_that_holds(
     if reason == "out of reach":
         raise unreachable(rail, s, "the arm cannot follow the path to here in any posture") from furthest
     index = rail.path_index(s)
-    why = {"branch flip": "joint jump", "joint limit": "joint limit", "rough path": "orientation jump"}.get(reason, "collision")
+    why = LOST.get(reason, "collision")
     raise MotionError(
         f"path pose {index}: no posture gets further than {furthest}",
         index=index,
@@ -221,6 +243,7 @@ def _first_that_holds(
         reason=reason,
         why=why,
         q=furthest.data.get("q", ()),
+        until=furthest.data.get("until", s),
     ) from furthest
 
 
