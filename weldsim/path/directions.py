@@ -8,6 +8,7 @@ from weldsim.frames import unit
 from weldsim.quantity import Metre, Radian, RadianPerMetre
 
 BATCH = 64  # nodes smoothed together
+OPPOSITE = 1e-12  # length of what two opposite unit directions have in common across either, rounding apart
 
 
 def one_sided(directions: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
@@ -51,14 +52,18 @@ def limited(s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], rate: Rad
     """Unit directions that turn by at most `rate` [rad/m] of arc length, as given wherever they already do.
 
     A limiter run forwards lags, one run backwards leads: their middle does neither, and turns half as fast as either, so both
-    may turn at twice the rate. The last pass makes good what their middle may exceed.
+    may turn at twice the rate. The last pass makes good what their middle may exceed. Between opposite directions every way is as
+    short: the one taken leads by the axis of the frame that they are most square to.
     """
     steps = rate * np.diff(s)
     if (turn(directions) <= steps).all():
         return directions
     forwards = _chase(directions, 2 * steps)
     backwards = _chase(directions[::-1], 2 * steps[::-1])[::-1]
-    return _chase(unit(forwards + backwards), steps)
+    middle = forwards + backwards
+    for i in np.flatnonzero(np.linalg.norm(middle, axis=1) < OPPOSITE):
+        middle[i] = _aside(forwards[i])
+    return _chase(unit(middle), steps)
 
 
 def _chase(directions: Float[ndarray, "n 3"], steps: Float[ndarray, "n-1"]) -> Float[ndarray, "n 3"]:
@@ -73,6 +78,12 @@ def _towards(a: Float[ndarray, "3"], b: Float[ndarray, "3"], most: Radian) -> Fl
     """`b`, or where it is further than `most` [rad] from `a`, the direction that far from `a` on the way to it."""
     aside = b - (a @ b) * a
     length = float(np.linalg.norm(aside))
-    if np.arctan2(length, a @ b) <= most or length < 1e-12:
-        return b if a @ b > 0 else a
-    return np.cos(most) * a + np.sin(most) * aside / length
+    if np.arctan2(length, a @ b) <= most or (length < OPPOSITE and a @ b > 0):
+        return b
+    return np.cos(most) * a + np.sin(most) * (_aside(a) if length < OPPOSITE else aside / length)
+
+
+def _aside(a: Float[ndarray, "3"]) -> Float[ndarray, "3"]:
+    """The unit direction square to `a`, and to its opposite, nearest to the axis that is most so."""
+    axis = np.eye(3)[np.abs(a).argmin()]
+    return unit(axis - (a @ axis) * a)

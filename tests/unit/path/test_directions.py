@@ -58,6 +58,31 @@ def test_a_turn_that_obeys_the_limit_is_left_as_it_is() -> None:
     assert limited(s, z, 0.9 * most) is not z
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_exact_reversal_becomes_half_a_turn_at_the_limits_rate(axis: int, sign: float) -> None:
+    """Opposite directions have no shortest way between them: half a turn by the first axis that is square to them."""
+    rate, at = 40.0, 0.1
+    s = uneven(0.0, 0.2, 5)
+    a, aside = sign * np.eye(3)[axis], np.eye(3)[0 if axis else 1]
+    found = limited(s, np.where(s[:, None] < at, a, -a), rate)
+    half = np.pi / (2 * rate)
+    wanted = np.pi * np.clip((s - (at - half)) / (2 * half), 0.0, 1.0)
+    np.testing.assert_allclose(np.arctan2(found @ aside, found @ a) % (2 * np.pi), wanted, atol=1.1e-3 * rate)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-12)
+    assert (turn(found) <= rate * np.diff(s) + 1e-9).all()
+
+
+def test_opposite_directions_at_one_place_and_near_opposite_ones_stay_directions() -> None:
+    s = np.array([0.0, 0.001, 0.001, 0.002])
+    z = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 0.0, -1.0]])
+    np.testing.assert_allclose(np.linalg.norm(limited(s, z, 100.0), axis=1), 1.0, atol=1e-12)
+    for off in (1e-15, 1e-12, 1e-9, 1e-6):
+        near = unit(z + np.array([0.0, off, 0.0]) * (z[:, 2:] < 0))
+        found = limited(np.linspace(0.0, 0.003, 4), near, 100.0)
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("length", [0.004, 0.01])
 def test_a_plane_of_directions_is_smoothed_to_itself_to_the_ends(length: float) -> None:
     """A local line has no bias for what is linear in arc length, however uneven the samples."""
