@@ -304,3 +304,28 @@ def test_overlap_is_both_over_either() -> None:
     assert region_overlap(found, true) == 0.5
     assert region_overlap(found & False, true & False) == 1.0
     assert region_overlap(found, true & False) == 0.0
+
+
+def test_of_a_wire_that_leans_ever_more_the_median_and_the_95th_percentile_are_told() -> None:
+    """By 0 to 0.2 rad, evenly along the line: half of it by less than 0.1 rad, and 95 % by less than 0.19 rad."""
+    x = np.linspace(0.0, LENGTH, 2001)
+    lean = 0.2 * x / LENGTH
+    axes = np.stack([0 * x, np.sin(lean), -np.cos(lean)], axis=1)
+    error = line_error(along(x), axes, straight())
+    assert error.axis_median == pytest.approx(0.1, abs=1e-5)
+    assert error.axis_p95 == pytest.approx(0.19, abs=1e-5)
+
+
+def test_a_line_goes_on_along_its_own_first_and_last_direction() -> None:
+    """A polyline that turns left by 90 deg, and a quarter of the ring: each goes on straight from either end."""
+    corner = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.01, 0.01, 0.0]])
+    found = offsets(np.array([[-0.005, 0.001, 0.0], [0.012, 0.015, 0.0]]), corner)
+    np.testing.assert_allclose(found.s, [-0.005, 0.025], atol=1e-12)
+    np.testing.assert_allclose(found.distance, [0.001, 0.002], atol=1e-12)
+    whole, quarter = ring(), slice(0, 501)
+    parts = ("opening_B", "root_B", "left_B", "right_B", "tangents_B", "bisectors_B", "s")
+    known = replace(whole, **{name: getattr(whole, name)[quarter] for name in parts})
+    beyond = np.array([[RADIUS + 0.001, -0.004, 0.0], [-0.004, RADIUS - 0.002, 0.0]])
+    found = known_offsets(beyond, known)
+    np.testing.assert_allclose(found.s, [-0.004, ROUND / 4 + 0.004], atol=1e-6)
+    np.testing.assert_allclose(found.distance, [0.001, 0.002], atol=1e-6)

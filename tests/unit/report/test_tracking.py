@@ -8,7 +8,7 @@ import pytest
 from tests.seams import found_seam, sine_seam, torch_path
 from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.records import ExecutionLog, Segment, TorchPath
-from weldsim.report.tracking import SpeedRule, speed_error, thinned, tracking_error
+from weldsim.report.tracking import SpeedRule, speed_error, thinned, torch_speed, tracking_error
 
 PERIOD = 0.01  # [s]
 
@@ -132,3 +132,30 @@ def test_no_arc_or_a_short_one_has_no_speed(path: TorchPath) -> None:
     assert speed_error(weld(path, np.full(62, 6e-3)), path) is not None
     assert speed_error(replace(log, arc_on=np.arange(60) == 5), path) is None
     assert speed_error(replace(log, arc_on=np.zeros(60, bool)), path) is None
+
+
+def test_a_plan_that_stands_still_at_its_ends_goes_on_straight_beyond_them() -> None:
+    planned = along_x(np.array([0.0, 0.0, 0.0, 0.05, 0.1, 0.1]))
+    tip = np.array([[-0.01, 0.001, 0.0], [0.05, -0.002, 0.0], [0.11, 0.0, 0.003]])
+    found = tracking_error(tip, planned)
+    np.testing.assert_allclose(found.offsets.distance, [0.001, 0.002, 0.003], atol=1e-12)
+    np.testing.assert_allclose(found.offsets.s, [-0.01, 0.05, 0.11], atol=1e-12)
+    assert found.mean == pytest.approx(0.002)
+
+
+def test_an_arc_that_is_out_for_one_instant_makes_two_pieces() -> None:
+    x = 1e-3 * np.arange(101)
+    on = np.ones(101, bool)
+    on[50] = False
+    path = TorchPath(
+        X_BT=Transform("BT", np.tile(np.eye(3), (101, 1, 1)), along_x(x)),
+        s=x,
+        speed=np.full(101, 0.1),
+        arc_on=on,
+        segments=(Segment.WELD,) * 101,
+    )
+    found = torch_speed(log_of(along_x(x), x, on), path)
+    assert found is not None
+    t = PERIOD * np.arange(101)
+    np.testing.assert_allclose(found.lit, np.where(t[on] < 0.5, 0.0, 0.51), atol=1e-12)
+    np.testing.assert_allclose(found.out, np.where(t[on] < 0.5, 0.49, 1.0), atol=1e-12)

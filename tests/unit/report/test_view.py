@@ -65,6 +65,15 @@ def test_a_ring_is_seen_with_x_across_it() -> None:
     np.testing.assert_allclose(view_frame(plate(0.01), (one,)).R[:, 0], [-1.0, 0.0, 0.0], atol=1e-12)
 
 
+def test_a_bent_seam_is_seen_along_its_chord() -> None:
+    """A quarter of a ring: its chord is 0.9 of its length, and its first half leads another way."""
+    angle = np.linspace(0.0, np.pi / 2, 101)
+    quarter = 0.05 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    tangents = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    one = Seam(points_B=quarter, s=0.05 * angle, tangents_B=tangents, normals_B=np.tile([0.0, 0.0, 1.0], (101, 1)))
+    np.testing.assert_allclose(view_frame(plate(0.01), (one,)).R[:, 0], np.array([-1.0, 1.0, 0.0]) / np.sqrt(2), atol=1e-12)
+
+
 @pytest.mark.parametrize("above", [True, False, None])
 def test_without_a_seam_the_view_is_the_clouds_own_plane_from_the_sensors_side(above: bool | None) -> None:
     x, y = np.meshgrid(np.linspace(-0.2, 0.2, 41), np.linspace(-0.1, 0.1, 21))
@@ -228,3 +237,11 @@ def test_errors_left_of_travel_are_positive(known: KnownSeam) -> None:
     np.testing.assert_allclose(aside, 2e-4, atol=1e-12)
     found = error_lines(findings((line,), np.zeros(3, bool)), (torch_path(line),), None, (known,), 0)["plan"]
     assert (found.across > 0).all()
+
+
+def test_a_weld_a_hair_shorter_than_so_many_torch_axes_has_its_last_at_its_end() -> None:
+    path = torch_path(seam())
+    short = replace(path, s=path.s * (1 - 5e-9), X_BT=Transform("BT", path.X_BT.R, path.X_BT.p))
+    lines = torch_axes(short, every=LENGTH / 4, length=0.03)
+    assert len(lines) == 5
+    np.testing.assert_allclose(lines[-1, 0], path.X_BT.p[-1], atol=1e-12)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import platform
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from tests.seams import findings, found_seam, sine_seam, torch_path, weld_log
 from weldsim.curves import arc_length
-from weldsim.records import WeldReport
+from weldsim.records import WeldProgress, WeldReport
 from weldsim.report.limits import ReportConfig, checks
 from weldsim.report.verdict import AMBER, FAILED, PASSED, UNJUDGED, verdict
 from weldsim.report.weld import joined, report_json, weld_report
@@ -231,3 +232,27 @@ def test_a_looser_limit_that_is_needed_is_amber_in_a_plan_too() -> None:
     )
     assert not tight.passed
     assert tight.warnings == ()
+
+
+def test_what_was_not_planned_and_how_far_a_stopped_weld_came_are_kept() -> None:
+    known = sine_seam(np.random.default_rng(3))
+    seam = found_seam(known, np.zeros(len(known.s)))
+    came = WeldProgress(length=0.2, s_from=0.0, s_to=0.05, welded=0.05, arc=True, position_B=(0.0, -0.5, 0.1))
+    whole = weld_report(findings((seam,), np.zeros(5, bool)), (torch_path(seam),), scene="x", known=(known,), unplanned=("seam 2",))
+    assert (whole.progress, whole.unplanned) == (None, ("seam 2",))
+    stopped = weld_report(
+        findings((seam,), np.zeros(5, bool)), (torch_path(seam),), scene="x", known=(known,), stopped="the operator", progress=came
+    )
+    assert (stopped.progress, stopped.stopped) == (came, "the operator")
+    both = joined((whole, replace(stopped, seam=2)))
+    assert (both.progress, both.stopped, both.unplanned) == (came, "the operator", ("seam 2",))
+
+
+def test_json_says_its_units_and_each_check_in_the_same_words() -> None:
+    report, config = job(), ReportConfig()
+    data = report_json(report)
+    assert data["units"] == {"length": "m", "angle": "rad", "time": "s"}
+    listed = [(c["figure"], c["value"], c["limit"], c["passed"], c["amber"]) for c in data["checks"]]
+    assert listed == [(c.figure, c.value, c.limit, c.passed, c.amber or None) for c in checks(report, config)]
+    assert data["versions"]["python"] == platform.python_version()
+    assert set(data["versions"]) >= {"python", "weldsim", "numpy", "scipy"}
