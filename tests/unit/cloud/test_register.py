@@ -26,9 +26,15 @@ def made(block: Block, angles=FAN, seed: int = 0, intrinsics=NARROW, **errors) -
 
 @pytest.mark.parametrize("noise", ["none", "iid", "d415"])
 @pytest.mark.parametrize(
-    ("block", "angles"), [(BLOCK, FAN), (BLOCK, (-60.0, 0.0, 60.0)), (PLATE, (-25.0, 25.0)), (WIDE, (-30.0, 0.0, 30.0))]
+    ("block", "angles", "noisy"),  # the last: mean and greatest misalignment [m] under a D415's noise
+    [
+        (BLOCK, FAN, (0.4e-3, 0.6e-3)),
+        (BLOCK, (-60.0, 0.0, 60.0), (0.7e-3, 1.0e-3)),
+        (PLATE, (-25.0, 25.0), (0.7e-3, 1.0e-3)),
+        (WIDE, (-30.0, 0.0, 30.0), (0.3e-3, 0.4e-3)),
+    ],
 )
-def test_grooves_of_all_views_come_together(block, angles, noise):
+def test_grooves_of_all_views_come_together(block, angles, noisy, noise):
     """Where all that can go wrong does: what is left is what a plate does not show, a hand-eye mistake along it.
 
     A measured D415's noise has waves as long as a plate's side, of 0.2 mm at 0.4 m and 0.5 mm at 0.7 m: three views 60 degrees
@@ -44,7 +50,7 @@ def test_grooves_of_all_views_come_together(block, angles, noise):
         assert found.alone == ()
         assert seen.misalignment(clouds) < seen.misalignment(seen.clouds)
         after.append(seen.misalignment(clouds))
-    mean, most = (0.7e-3, 1.0e-3) if noise == "d415" else (0.5e-3, 0.8e-3)
+    mean, most = noisy if noise == "d415" else (0.5e-3, 0.8e-3)
     assert np.mean(after) < mean
     assert max(after) < most
 
