@@ -140,6 +140,13 @@ def test_half_a_turn_about_each_axis(axis: int) -> None:
     np.testing.assert_allclose(np.abs(rotation_vector_from_matrix(R)), np.pi * np.eye(3)[axis], atol=1e-15)
 
 
+def test_a_quaternion_has_double_precision_whatever_the_matrix_has() -> None:
+    R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], np.float32)
+    found = quaternion_from_matrix(R)
+    assert found.dtype == np.float64
+    np.testing.assert_allclose(found, np.sqrt([0.5, 0.0, 0.0, 0.5]), atol=1e-15)
+
+
 def test_no_turn_is_none() -> None:
     np.testing.assert_array_equal(quaternion_from_matrix(np.eye(3)), [1.0, 0.0, 0.0, 0.0])
     np.testing.assert_array_equal(rotation_vector_from_matrix(np.eye(3)), np.zeros(3))
