@@ -2,7 +2,6 @@
 
 import copy
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -47,7 +46,8 @@ class CellCollision:
         """Args: model of a world with the arm, its joints named as in `weldsim.kinematics.JOINT_NAMES`."""
         self._model, self._data = model, mujoco.MjData(model)
         self._wide = copy.copy(model)
-        self._wide.geom_margin[:] = NEAR / 2  # the margins of both geoms of a pair add up
+        # The margins of both geoms of a pair add up; bodies farther apart than their own margins are not looked at.
+        self._wide.geom_margin[:] = self._wide.body_margin[:] = NEAR / 2
         self._wide_data = mujoco.MjData(self._wide)
         self._qpos = np.array([model.joint(name).qposadr[0] for name in JOINT_NAMES])
         root = model.body(ARM_ROOT).id
@@ -87,19 +87,12 @@ class CellCollision:
 
     def gap(self, q: Float[ndarray, "6"]) -> float:
         """Distance [m] of the arm at q [rad] from the nearest other body or far link, negative in contact, NEAR at most."""
-        data = self._wide_data
-        data.qpos[self._qpos] = q
-        mujoco.mj_kinematics(self._wide, data)
-        mujoco.mj_collision(self._wide, data)
-        if data.ncon == 0:
-            return NEAR
-        first, second = data.contact.geom.T
-        return min(NEAR, float(np.where(self._telling[first, second], data.contact.dist, NEAR).min()))
+        return self.nearest(q)[0]
 
     def nearest(self, q: Float[ndarray, "6"]) -> tuple[float, str, str]:
         """Distance [m] of the arm at q [rad] from the nearest other body or far link, and the names of the two; NEAR and no names
         where nothing is as near as that."""
-        model, data = self._widest
+        model, data = self._wide, self._wide_data
         data.qpos[self._qpos] = q
         mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
@@ -113,17 +106,8 @@ class CellCollision:
         first, second = (_said(model.geom(int(g)).name) or f"geom {g}" for g in pairs[least])
         return float(gaps[least]), first, second
 
-    @cached_property
-    def _widest(self) -> tuple[Any, Any]:
-        """The model as it is now, its margins NEAR for a pair, and its state. Bodies farther apart than their own margins are not
-        looked at, so these are set too."""
-        model = copy.copy(self._model)
-        model.geom_margin[:] = model.body_margin[:] = NEAR / 2
-        return model, mujoco.MjData(model)
-
     def shift(self, body: str, position: Float[ndarray, "3"], quaternion: Float[ndarray, "4"]) -> None:
         """Put a fixed body elsewhere in its parent [m], wxyz: `fixture` carries the part and what holds it."""
-        self.__dict__.pop("_widest", None)
         for model in (self._model, self._wide):
             index = model.body(body).id
             model.body_pos[index], model.body_quat[index] = position, quaternion

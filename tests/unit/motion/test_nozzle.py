@@ -83,6 +83,30 @@ def test_the_wire_may_touch_and_the_mouth_behind_it_may_not(walls: tuple[mujoco.
         assert (CellCollision(model).touch(START) is not None) is touches, behind
 
 
+@pytest.mark.parametrize("distance", [-0.002, 0.001, 0.008, 0.015, 0.020, 0.027])
+def test_how_near_a_body_is_that_is_not_touched(walls: tuple[mujoco.MjModel, Transform], distance: float) -> None:
+    """A small plate across the wire, its near face so far ahead of the nozzle's mouth [m]."""
+    model, X_WT = walls
+    place(model, "right", Transform("WT", X_WT.R, X_WT.p + X_WT.R @ np.array([0.0, 0.0, 0.2])))
+    place(model, "left", Transform("WT", X_WT.R, X_WT.points(np.array([[0.0, 0.0, distance - MOUTH + 0.0005]]))[0]))
+    collision = CellCollision(model)
+    gap, first, second = collision.nearest(START)
+    assert gap == pytest.approx(distance, abs=1e-5)
+    assert collision.gap(START) == gap
+    assert first.startswith("nozzle")
+    assert second == "left"
+
+
+def test_a_body_put_elsewhere_is_as_near_as_it_is_there(walls: tuple[mujoco.MjModel, Transform]) -> None:
+    model, X_WT = walls
+    place(model, "right", Transform("WT", X_WT.R, X_WT.p + X_WT.R @ np.array([0.0, 0.0, 0.2])))
+    collision = CellCollision(model)
+    for distance in (0.005, 0.02, 0.01):
+        there = X_WT.points(np.array([[0.0, 0.0, distance - MOUTH + 0.0005]]))[0]
+        collision.shift("left", there, Transform("WT", X_WT.R, there).quaternion)
+        assert collision.gap(START) == pytest.approx(distance, abs=1e-5)
+
+
 def test_everything_drawn_of_the_tool_but_the_wire_is_in_a_collision_body(walls: tuple[mujoco.MjModel, Transform]) -> None:
     model, _ = walls
     data = mujoco.MjData(model)
