@@ -9,6 +9,8 @@ from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.records import PointCloud
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.find import find_seams_profile
+from weldsim.seam.profile.section import Section
+from weldsim.seam.profile.track import _meets_other
 
 WIDTH, DEPTH, SPACING = 0.012, 0.007, 0.0008  # [m]
 TURNS = (0.0, 2.5)  # [rad] about the vertical: the finder may walk a groove either way
@@ -104,3 +106,27 @@ def test_a_groove_that_leaves_its_plate_at_a_slant_ends_at_the_edge(slant: float
     ends = np.sort(seam.points_B[[0, -1], 0])
     assert np.abs(ends - [-0.08, 0.08]).max() < 3e-3
     assert np.abs(seam.points_B[:, 1] + 0.5).max() < 0.5e-3
+
+
+@pytest.mark.parametrize("radius", [0.185, 0.15])
+def test_the_line_stays_on_a_bent_groove_up_to_an_edge_aslant(radius: float) -> None:
+    """Past the edge on one side the groove is still followed by its other lip: straight on would be half a millimetre off."""
+    x, y = np.meshgrid(np.arange(-0.1, 0.1, SPACING), np.arange(-0.09, 0.06, SPACING))
+    off = np.hypot(x, y + radius) - radius
+    below = DEPTH * np.maximum(1 - np.abs(off) / (WIDTH / 2), 0.0)
+    points = np.stack([x, y - 0.5, -below], axis=-1).reshape(-1, 3)
+    (seam,) = find_seams_profile(PointCloud(points=points, viewpoints=np.array([[0.0, -0.5, 0.45]])), ProfileConfig()).seams
+    assert np.abs(np.sort(seam.points_B[[0, -1], 0]) - [-0.1, 0.1]).max() < 3e-3
+    across = np.hypot(seam.points_B[:, 0], seam.points_B[:, 1] + 0.5 + radius) - radius
+    assert np.abs(across).max() < 0.1e-3
+
+
+def test_what_lies_beside_a_groove_tells_a_junction_from_a_plates_edge() -> None:
+    """Past an edge nothing is seen, or something far below; at a junction the other groove, which is no plate either."""
+    section = Section(middle=0.0, width=WIDTH, depth=DEPTH, floor=0.0, lean=0.0, blur=0.002)
+    model = np.tile(np.r_[np.zeros(20), np.full(10, DEPTH), np.zeros(20)], (4, 1))
+    depth = model.copy()
+    depth[1, :20] = np.nan  # past the edge
+    depth[2, 2:4] = 0.0035  # noise
+    depth[3, 35:45] = 0.006  # another groove
+    assert _meets_other(np.isfinite(depth), depth, model, section).tolist() == [False, False, False, True]

@@ -26,6 +26,7 @@ TURN = 8.0  # stations beyond the last one seen, over which a line that goes str
 ENOUGH = 0.35  # of the usual data for a station
 LONGEST_DIP = 0.045  # [m] over which a groove may be hidden by noise
 LEAST_SPREAD = 0.05  # of the amplitude, over the amplitude
+OTHER_SHARE = 0.1  # of the cells beside a groove: a camera's noise puts 0.07 of them off the plate at most, a junction 0.3 and more
 ABSENT = 3.0  # log likelihood ratio from which on a groove is not there
 FEWEST_ROWS = 6  # independent looks at the groove that tell how noise is alike across it
 QUIET = 5e-5  # [m] least standard deviation of a cell
@@ -46,6 +47,8 @@ class Track:
         misfit: rms of the grid about the section, over the rms of the grid itself, both averaged along the seam.
         usual: amplitude where the groove is seen.  spread: its standard deviation over `usual`.  alike: stations over which
             that is alike; all as the noise makes them.
+        run_out: (m,) information of stations past the first and last one seen, where the groove goes on with a plate on one
+            side alone, as past an edge aslant across it. They say where the line is, not how far a groove is sure.
     """
 
     offset: Float[ndarray, "m"]
@@ -58,12 +61,18 @@ class Track:
     usual: float = 1.0
     spread: float = 0.0
     alike: float = 1.0
+    run_out: Float[ndarray, "m"] | float = 0.0
+
+    @property
+    def information(self) -> Float[ndarray, "m"]:
+        """(m,) of all stations that say where the line is: those seen, and those past them."""
+        return self.weight + self.run_out
 
     @property
     def core(self) -> slice:
-        """From the first to the last station seen."""
-        seen = np.flatnonzero(self.weight > 0)
-        return slice(int(seen[0]), int(seen[-1]) + 1)
+        """From the first to the last station that says where the line is."""
+        told = np.flatnonzero(self.information > 0)
+        return slice(int(told[0]), int(told[-1]) + 1)
 
     def absence(self, part: slice) -> float:
         """Log likelihood ratio of "no groove" to "a groove as everywhere" over a stretch of stations; those without data
@@ -84,9 +93,8 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     model -= slope * (grid.at - grid.x)  # depth falls to the left by as much as it grows when the section moves there
     # Far below the bottom or above the lips there is no groove but the table past the plate's edge, or a clamp.
     with np.errstate(invalid="ignore"):
-        known = (grid.depth < deepest(section)) & (grid.depth > -0.004)
-    if not flanked.all():
-        known &= flanked[:, None] | ~_beside_other(grid, section, model)
+        within = (grid.depth < deepest(section)) & (grid.depth > -0.004)
+    known = within if flanked.all() else within & (flanked[:, None] | ~_beside_other(grid, section, model))
     # Inside the groove a stereo camera is about twice as noisy as on the plate.
     weight = np.where(known, 1.0, 0.0) / (1.0 + np.clip(np.abs(slope) / 0.3, 0.0, 1.0)) ** 2
     # Plates at two heights step where there is no groove too.
@@ -113,8 +121,42 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
+    goes_on = groove & ~flanked & ~_meets_other(within, grid.depth - plates, model, section)
+    run_out = np.where(_run_out(seen, goes_on), ss, 0.0)
     misfit = _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
-    return Track(section.middle + shift, weights, amplitude, local, least, depth_reach, misfit, usual, spread, alike)
+    return Track(section.middle + shift, weights, amplitude, local, least, depth_reach, misfit, usual, spread, alike, run_out)
+
+
+def _flat(section: Section, model: Float[ndarray, "m w"]) -> Bool[ndarray, "m w"]:
+    """Cells beside the groove, where its own section is flat."""
+    return np.abs(model) < 0.02 * section.depth
+
+
+def _meets_other(
+    within: Bool[ndarray, "m w"], depth: Float[ndarray, "m w"], model: Float[ndarray, "m w"], section: Section
+) -> Bool[ndarray, "m"]:
+    """Stations beside which the surface is not the plate's, OTHER_SHARE of it and more: another groove's, say, or a clamp's.
+
+    Args:
+        within: cells with a depth that a groove may have.  depth, model: seen and expected there [m].
+    """
+    beside = within & _flat(section, model)
+    other = beside & (np.abs(np.where(within, depth, 0.0)) > TOLERANCE)
+    return np.asarray(other.sum(axis=1) > OTHER_SHARE * beside.sum(axis=1))
+
+
+def _run_out(seen: Bool[ndarray, "m"], goes_on: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
+    """Stations past the first and the last one seen, for as long as the groove goes on."""
+    out = np.zeros(len(seen), bool)
+    told = np.flatnonzero(seen)
+    if not len(told):
+        return out
+    for way, end in ((-1, int(told[0])), (1, int(told[-1]))):
+        j = end + way
+        while 0 <= j < len(seen) and goes_on[j]:
+            out[j] = True
+            j += way
+    return out
 
 
 def _correlated_shift(
@@ -162,7 +204,7 @@ def _beside_other(grid: Grid, section: Section, model: Float[ndarray, "m w"]) ->
     """Cells within half the camera's window of something that is neither the groove nor the plate."""
     with np.errstate(invalid="ignore"):
         other = (grid.depth >= deepest(section)) | (grid.depth <= -0.004)
-        other |= (np.abs(model) < 0.02 * section.depth) & (np.abs(grid.depth) > TOLERANCE)
+        other |= _flat(section, model) & (np.abs(grid.depth) > TOLERANCE)
     marked = other.astype(np.uint8)
     # A stray point is no surface.
     number = cv2.boxFilter(marked, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
@@ -285,7 +327,7 @@ def smoothed(rail: Rail, track: Track) -> tuple[Float[ndarray, "m"], Choice]:
     """
     core = track.core
     bow = _bow(rail.points[core], rail.e[core])
-    values, weight = track.offset[core] + bow, track.weight[core]
+    values, weight = track.offset[core] + bow, track.information[core]
     shared = 2 * track.reach + 1
     lengths = np.sqrt(shared**2 / 3 + (np.array(CAMERA_REACHES) / rail.step) ** 2)
     choice = choose(values, weight, lengths, track.reach + 1)
@@ -331,7 +373,7 @@ def _bow(points: Float[ndarray, "k 3"], e: Float[ndarray, "k 3"]) -> Float[ndarr
 def track_deviation(track: Track, choice: Choice) -> Float[ndarray, "m"]:
     """Standard deviation of the smoothed lateral position at each station [m]."""
     core = track.core
-    weight = track.weight[core]
+    weight = track.information[core]
     sigma = deviation(weight, choice.strength, correlation(np.arange(len(weight)), choice.length)) * np.sqrt(choice.variance)
     # Beyond, the line goes straight on, and is wrong in its direction too.
     before, after = core.start - np.arange(core.start), np.arange(1, len(track.weight) - core.stop + 1)
