@@ -1,12 +1,16 @@
 """Each end of a groove is where it was made, on exact clouds of grooves whose two ends differ."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from weldsim.config import CellConfig, load_scene
 from weldsim.frames import Transform, matrix_from_rotation_vector
+from weldsim.pipeline import look
 from weldsim.records import PointCloud
+from weldsim.report.metrics import known_offsets
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.find import find_seams_profile
 from weldsim.seam.profile.section import Section
@@ -130,3 +134,22 @@ def test_what_lies_beside_a_groove_tells_a_junction_from_a_plates_edge() -> None
     depth[2, 2:4] = 0.0035  # noise
     depth[3, 35:45] = 0.006  # another groove
     assert _meets_other(np.isfinite(depth), depth, model, section).tolist() == [False, False, False, True]
+
+
+@pytest.mark.parametrize(("radius", "width", "depth"), [(185, 12, 6), (200, 14, 8)])
+def test_an_end_aslant_as_a_depth_camera_sees_it(radius: int, width: int, depth: int, tmp_path: Path) -> None:
+    """One view with the measured noise, the groove at 37 and 40 deg to the edge: each end within 3 mm, the last 10 mm within 1."""
+    text = (Path(__file__).parents[3] / "scenes" / "straight.toml").read_text()
+    (tmp_path / "one_view.toml").write_text("[[views]]".join(text.split("[[views]]")[:2]))
+    sizes = [f'centre_line.radius="{radius} mm"', f'groove.width="{width} mm"', f'groove.depth="{depth} mm"']
+    scene = load_scene(str(tmp_path / "one_view.toml"), ["centre_line.shape=arc", "fixture.clamps=0", *sizes])
+    seen = look(scene, CellConfig(), seed=2)
+    (seam,) = find_seams_profile(seen.cloud, ProfileConfig()).seams
+    (known,) = seen.world.known_seams
+    found = known_offsets(seam.points_B, known)
+    assert np.abs(np.sort(found.s[[0, -1]]) - [0.0, known.length]).max() < 3e-3
+    last = (seam.s < 0.010) | (seam.s > seam.length - 0.010)
+    off = found.distance[last]
+    assert np.percentile(off, 95) < 1e-3
+    assert seam.sigma is not None
+    assert (off < 2 * seam.sigma[last]).mean() > 0.9

@@ -15,6 +15,7 @@ ONE_SIDED = 0.003  # [m] a groove is followed past the plate on one side where n
 PAST_EDGE = 0.002  # [m] and past an edge that is
 FEWEST_COLUMNS = 3  # of a side's cells that show where its plate ends
 ASLANT = 0.3  # slope of an edge across the groove, read on one side of it alone
+APART = 0.010  # [m] at the groove, from which on the edges left and right of it are two plates'
 RUN_OUT = 0.010  # [m] the most an end is carried past the last station whose depth can be trusted
 
 
@@ -31,7 +32,7 @@ def seam_span(fit: Fit, config: ProfileConfig) -> tuple[float, float]:
 
 def _end(fit: Fit, last: int, way: int) -> float:
     amplitude, step = fit.track.amplitude, fit.rail.step
-    one_side = fit.parent.support.max(axis=1) > 0.5
+    one_side = (fit.parent.support.max(axis=1) > 0.5) | (np.broadcast_to(fit.track.run_out, amplitude.shape) > 0)
     edge = _edge_crossing(fit, way, last * step)
     most = ONE_SIDED if edge is None else max((edge - last * step) * way + PAST_EDGE, 0.0)
     j = last
@@ -84,6 +85,9 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     across, edge = across[~goes_on], edge[~goes_on]
     if len(across) < 2 * FEWEST_COLUMNS:
         return None
+    each = [_one_edge(across[side], edge[side]) for side in (across > 0, across < 0) if side.sum() >= FEWEST_COLUMNS]
+    if len(each) == 2 and abs(each[0] - each[1]) > APART:
+        return way * min(way * each[0], way * each[1])  # no one edge, but two plates: the groove ends with the first
     slope, level = _median_line(across, edge)
     off = np.abs(edge - level - slope * across)
     keep = off <= max(2.5 * float(np.median(off)), 0.0015)
