@@ -15,7 +15,8 @@ ONE_SIDED = 0.003  # [m] a groove is followed past the plate on one side where n
 PAST_EDGE = 0.002  # [m] and past an edge that is
 FEWEST_COLUMNS = 3  # of a side's cells that show where its plate ends
 ASLANT = 0.3  # slope of an edge across the groove, read on one side of it alone
-APART = 0.010  # [m] at the groove, from which on the edges left and right of it are two plates'
+APART = 0.010  # [m] from which on the edges left and right of a groove may be two plates'
+SQUARE = 0.5  # of the slope of a line through both, under which each is square
 RUN_OUT = 0.010  # [m] the most an end is carried past the last station whose depth can be trusted
 
 
@@ -85,9 +86,9 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     across, edge = across[~goes_on], edge[~goes_on]
     if len(across) < 2 * FEWEST_COLUMNS:
         return None
-    each = [_one_edge(across[side], edge[side]) for side in (across > 0, across < 0) if side.sum() >= FEWEST_COLUMNS]
-    if len(each) == 2 and abs(each[0] - each[1]) > APART:
-        return way * min(way * each[0], way * each[1])  # no one edge, but two plates: the groove ends with the first
+    two = _two_edges(across, edge)
+    if two is not None:
+        return way * min(way * two[0], way * two[1])  # the groove ends with the first
     slope, level = _median_line(across, edge)
     off = np.abs(edge - level - slope * across)
     keep = off <= max(2.5 * float(np.median(off)), 0.0015)
@@ -107,6 +108,22 @@ def _one_edge(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> float:
     """Where the edge of the plate on one side, carried on to the groove, crosses it [m]; square unless it is clearly aslant."""
     slope, level = _median_line(across, edge)
     return level if abs(slope) > ASLANT else float(np.median(edge))
+
+
+def _two_edges(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> tuple[float, float] | None:
+    """The edges left and right of a groove [m] where they are two plates'; None where one edge runs across it.
+
+    Two square edges lie apart at the groove, and a line through both is steeper than either.
+    """
+    sides = [side for side in (across > 0, across < 0) if side.sum() >= FEWEST_COLUMNS]
+    if len(sides) < 2:
+        return None
+    (x0, e0), (x1, e1) = ((float(np.median(across[side])), float(np.median(edge[side]))) for side in sides)
+    if abs(e0 - e1) < APART:
+        return None
+    through = (e0 - e1) / (x0 - x1)
+    own = [_median_line(across[side], edge[side])[0] / through for side in sides]
+    return (e0, e1) if max(own) < SQUARE else None
 
 
 def _median_line(x: Float[ndarray, "k"], y: Float[ndarray, "k"]) -> tuple[float, float]:
