@@ -71,7 +71,7 @@ def read_cloud(
     keep = _seen(raw.points)
     total, dropped = len(keep), int((~keep).sum())
     if dropped == total:
-        raise CloudError(f"{path}: none of its {total} points is finite and not zero", path=str(path), total=total)
+        raise CloudError(f"{path}: none of its {total} points is finite", path=str(path), total=total)
     with np.errstate(over="ignore", invalid="ignore"):
         check_grain(str(path), raw.points[keep] if dropped else raw.points, scale)
         if crop is not None:
@@ -119,12 +119,13 @@ def _read_obj(data: bytes) -> RawCloud:
 
 
 def _seen(points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
-    """Which points are finite, without the origin where several lie there: cameras write 0 0 0 for a pixel that saw nothing."""
+    """Which points are finite, without the origin where several lie there, and others elsewhere: cameras write
+    0 0 0 for a pixel that saw nothing."""
     x, y, z = np.isfinite(points).T
     finite = x & y & z
     x, y, z = (points == 0).T
     blind = x & y & z
-    return finite & ~blind if np.count_nonzero(blind) > 1 else finite
+    return finite & ~blind if np.count_nonzero(blind) > 1 and not blind[finite].all() else finite
 
 
 def _unit_normals(normals: Float[ndarray, "n 3"] | None, keep: Bool[ndarray, "n"]) -> Float[ndarray, "m 3"] | None:

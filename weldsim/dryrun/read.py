@@ -63,8 +63,6 @@ def read_program(
         if roll_free is not None:
             paths = tuple(_with_roll(each, roll_free) for each in paths)
         return Program(source=path.name, kind="path", paths=paths, names=tuple(seam["id"] for seam in document["seams"]))
-    if path.suffix.lower() == ".urp":
-        raise InputError(f"{path}: is PolyScope's own; the .script that it saves beside it is read", path=str(path))
     text = _text(path)
     if path.suffix.lower() in SCRIPTS:
         return parse_script(text, source=str(path), X_FT=None if tool is None else _mount(tool), q_start=q_start)
@@ -77,6 +75,8 @@ def _refuse_others(path: Path) -> None:
     if path.is_dir():
         inside = path / "path.json"  # of a run directory
         raise InputError(f"{path}: is a folder; {f'did you mean {inside}?' if inside.is_file() else wanted}", path=str(path))
+    if path.suffix.lower() == ".urp":
+        raise InputError(f"{path}: is PolyScope's own; the .script that it saves beside it is read", path=str(path))
     if path.suffix.lower() not in (".json", *SCRIPTS, *TABLES):
         raise InputError(f"{path}: {wanted}", path=str(path))
 

@@ -47,5 +47,5 @@ def test_the_same_tour_gives_the_same_images():
 
 def test_a_view_without_a_way_is_refused_and_says_what_is_met():
     goal = HOME + np.array([1.0, 0, 0, 0, 0, 0])
-    with pytest.raises(MotionError, match="scan view 2: the arm finds no way there: a wall"):
+    with pytest.raises(MotionError, match="scan view 3: the arm finds no way there: a wall"):
         way(HOME, goal, CONFIG.motion, lambda q: "a wall" if abs(q[0] - HOME[0] - 0.5) < 0.2 else None, 2)

@@ -218,7 +218,7 @@ def test_bad_scenes_are_refused(tmp_path: Path) -> None:
         build_world(SceneConfig(views=()))
     with pytest.raises(SceneError, match="red"):
         build_world(SceneConfig(material=MaterialConfig(red=200.0)))
-    with pytest.raises(UnreachableError, match="scan view 0"):
+    with pytest.raises(UnreachableError, match="scan view 1"):
         build_world(SceneConfig(views=(ViewConfig(standoff=1.2),))).view_joints()
     with pytest.raises(SceneError, match="beyond the table's edge"):
         build_world(SceneConfig(pose=PartPoseConfig(y=-1.4)))

@@ -16,7 +16,7 @@ PAST_EDGE = 0.002  # [m] and past an edge that is
 FEWEST_COLUMNS = 3  # of a side's cells that show where its plate ends
 ASLANT = 0.3  # slope of an edge across the groove, read on one side of it alone
 APART = 0.010  # [m] from which on the edges left and right of a groove may be two plates'
-SQUARE = 0.5  # of the slope of a line through both, under which each is square
+NEARER = 0.5  # of its distance to one line, at which two square edges lie from where a plate's columns end
 RUN_OUT = 0.010  # [m] the most an end is carried past the last station whose depth can be trusted
 
 
@@ -113,17 +113,16 @@ def _one_edge(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> float:
 def _two_edges(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> tuple[float, float] | None:
     """The edges left and right of a groove [m] where they are two plates'; None where one edge runs across it.
 
-    Two square edges lie apart at the groove, and a line through both is steeper than either.
+    Two square edges that lie apart are much nearer to the columns' ends than any one line is; one edge aslant is not.
     """
     sides = [side for side in (across > 0, across < 0) if side.sum() >= FEWEST_COLUMNS]
     if len(sides) < 2:
         return None
-    (x0, e0), (x1, e1) = ((float(np.median(across[side])), float(np.median(edge[side]))) for side in sides)
-    if abs(e0 - e1) < APART:
-        return None
-    through = (e0 - e1) / (x0 - x1)
-    own = [_median_line(across[side], edge[side])[0] / through for side in sides]
-    return (e0, e1) if max(own) < SQUARE else None
+    one, other = (float(np.median(edge[side])) for side in sides)
+    slope, level = _median_line(across, edge)
+    off_line = float(np.median(np.abs(edge - level - slope * across)))
+    off_squares = float(np.median(np.abs(edge - np.where(across > 0, one, other))))
+    return (one, other) if abs(one - other) > APART and off_squares < NEARER * off_line else None
 
 
 def _median_line(x: Float[ndarray, "k"], y: Float[ndarray, "k"]) -> tuple[float, float]:

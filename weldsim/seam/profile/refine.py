@@ -22,7 +22,7 @@ from weldsim.seam.profile.track import Track, between, follow, smoothed, track_d
 from weldsim.seam.profile.views import Blocks, agree
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
-LOOK_AHEAD = 0.040  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it, and a plate's edge aslant
+LOOK_AHEAD = 0.036  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it, and a plate's edge aslant
 # across the groove shows on both sides. No farther: the points around a coarse line reach 42 mm from it
 AT_AN_END = 0.003  # [m] before the end of its rail a groove goes on, for all one can see
 MOST_LOOKS = 3
