@@ -6,6 +6,8 @@ background, the smoothing from the likelihood of correlated noise, the blur of t
 groove's own shape.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
@@ -101,18 +103,31 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
         if reason is not None and whole_line:
             rejected.append(_rejection(line, reason))
     joined = join_pieces(found, atlas, config)
-    whole = _without_doubles([piece for piece in joined if piece.whole])
-    carried = _without_doubles([carry_on(piece, atlas, config) for piece in whole])
-    parted = _without_doubles(part_at_branches(carried, atlas, config))
+    whole = _without_doubles([piece for piece in joined if piece.whole], config)
+    carried = _without_doubles([carry_on(piece, atlas, config) for piece in whole], config)
+    parted = _without_doubles(part_at_branches(carried, atlas, config), config)
     return at_one_window(parted, atlas.cloud.viewpoints, config), rejected
 
 
-def _without_doubles(pieces: list[Piece]) -> list[Piece]:
-    """The pieces without those that lie along a longer one."""
+def _without_doubles(pieces: list[Piece], config: ProfileConfig) -> list[Piece]:
+    """The pieces without those that lie along a longer one; of one that does so in part, the longest stretch that does not.
+
+    At a junction two lines may each lead through it, and one branch is then a part of both.
+    """
     kept: list[Piece] = []
     for piece in sorted(pieces, key=lambda piece: piece.span[0] - piece.span[1]):
-        if not any(_covers(other, piece.fit.rail.points[station_mask(piece.fit, piece.span)]) for other in kept):
-            kept.append(piece)
+        stations = np.flatnonzero(station_mask(piece.fit, piece.span))
+        line = piece.fit.rail.points[stations]
+        if any(_covers(other, line) for other in kept):
+            runs = _own_runs(line, kept, config.min_length)
+            if not runs:
+                continue
+            own = max(runs, key=lambda run: run.stop - run.start)
+            step = piece.fit.rail.step
+            piece = replace(piece, span=(float(stations[own.start] * step), float(stations[own.stop - 1] * step)))
+            if refusal(piece.fit, piece.span, config) is not None:
+                continue
+        kept.append(piece)
     return kept
 
 

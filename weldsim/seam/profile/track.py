@@ -27,6 +27,7 @@ ENOUGH = 0.35  # of the usual data for a station
 LONGEST_DIP = 0.045  # [m] over which a groove may be hidden by noise
 LEAST_SPREAD = 0.05  # of the amplitude, over the amplitude
 OTHER_SHARE = 0.1  # of the cells beside a groove: a camera's noise puts 0.07 of them off the plate at most, a junction 0.3 and more
+PULLED = 6  # stations past a run-out, in which something else may pull at it
 ABSENT = 3.0  # log likelihood ratio from which on a groove is not there
 FEWEST_ROWS = 6  # independent looks at the groove that tell how noise is alike across it
 QUIET = 5e-5  # [m] least standard deviation of a cell
@@ -121,8 +122,8 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
-    goes_on = groove & ~flanked & ~_meets_other(within, grid.depth - plates, model, section)
-    run_out = np.where(_run_out(seen, goes_on), ss, 0.0)
+    other = _meets_other(within, grid.depth - plates, model, section)
+    run_out = np.where(_run_out(seen, groove & ~flanked & ~other, other), ss, 0.0)
     misfit = _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
     return Track(section.middle + shift, weights, amplitude, local, least, depth_reach, misfit, usual, spread, alike, run_out)
 
@@ -145,8 +146,9 @@ def _meets_other(
     return np.asarray(other.sum(axis=1) > OTHER_SHARE * beside.sum(axis=1))
 
 
-def _run_out(seen: Bool[ndarray, "m"], goes_on: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
-    """Stations past the first and the last one seen, for as long as the groove goes on."""
+def _run_out(seen: Bool[ndarray, "m"], goes_on: Bool[ndarray, "m"], other: Bool[ndarray, "m"]) -> Bool[ndarray, "m"]:
+    """Stations past the first and the last one seen, for as long as the groove goes on; none where it goes on up to
+    something else, as another groove that it runs into, which pulls at it well before it is met."""
     out = np.zeros(len(seen), bool)
     told = np.flatnonzero(seen)
     if not len(told):
@@ -154,8 +156,10 @@ def _run_out(seen: Bool[ndarray, "m"], goes_on: Bool[ndarray, "m"]) -> Bool[ndar
     for way, end in ((-1, int(told[0])), (1, int(told[-1]))):
         j = end + way
         while 0 <= j < len(seen) and goes_on[j]:
-            out[j] = True
             j += way
+        beyond = other[j : j + PULLED] if way > 0 else other[max(j + 1 - PULLED, 0) : max(j + 1, 0)]
+        if not beyond.any():
+            out[min(end, j) + 1 : max(end, j)] = True
     return out
 
 
