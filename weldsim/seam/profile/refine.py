@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.curves import resample
-from weldsim.frames import unit
 from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.blocks import mean_blocks
 from weldsim.seam.profile.grid import Grid, make_grid
 from weldsim.seam.profile.lean import first_section, follow_section, settled_section
 from weldsim.seam.profile.parent import Parent, fit_parent
@@ -19,19 +19,16 @@ from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
 from weldsim.seam.profile.strength import Choice
 from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
-from weldsim.seam.profile.views import Blocks, agree
+from weldsim.seam.profile.views import agree
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
 LOOK_AHEAD = 0.036  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it, and a plate's edge aslant
 # across the groove shows on both sides. No farther: the points around a coarse line reach 42 mm from it
 AT_AN_END = 0.003  # [m] before the end of its rail a groove goes on, for all one can see
 MOST_LOOKS = 3
-BLOCK = 8  # stations averaged together for the cross-section fit
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
-FEWEST_CELLS = 40  # fewer do not fix a cross-section
 MOST_TURNS = 6
 STEEP = 0.9  # [rad] that the two sides may differ before the rail stands upright on the parent surface
-OTHER_VIEW = 0.08  # [rad] by which the sight turns from one block to the next only from view to view
 WIDEST_FOOTPRINT = 1.2  # of the camera's window on a surface seen at 35 deg, over one that faces it
 SETTLED = (2e-4, 5e-4)  # [m] a rail that moves less than this is done: without noise, and where cells have as much or more
 BRIDGE = 0.015  # [m] a groove goes on across this without being seen
@@ -367,20 +364,6 @@ def _evened(image: Float[ndarray, "m w"]) -> Float[ndarray, "m w"]:
     return cv2.boxFilter(image, -1, (1, 9), borderType=cv2.BORDER_CONSTANT)
 
 
-def _from_one_place(sight: Float[ndarray, "b 3"], candidates: Bool[ndarray, "b"]) -> Bool[ndarray, "b"]:
-    """Those of the blocks that one view shows, the one that shows the most of them.
-
-    Two views differ in blur, in which way it runs, and in where they put the groove; a section that leans, or is wider,
-    can make up for any of that.
-
-    Args:
-        sight: (b, 3) unit, in which direction each is seen.
-    """
-    jump = np.einsum("ij,ij->i", sight[1:], sight[:-1]) < np.cos(OTHER_VIEW)
-    view = np.concatenate([[0], np.cumsum(jump)])
-    return candidates & (view == np.bincount(view, weights=candidates).argmax())
-
-
 def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, float]:
     """The section fitted to blocks of stations, and its middle's standard deviation [m].
 
@@ -393,30 +376,3 @@ def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Sect
     if stage == "settled":
         return settled_section(blocks, start, noise)
     return (first_section if stage == "first" else follow_section)(blocks, start, noise), 0.0
-
-
-def mean_blocks(grid: Grid, flanked: Bool[ndarray, "m"], start: Section) -> Blocks | None:
-    """Blocks of stations that shape a section about as large as `start`, each with its own shear; None where they are too few.
-
-    Args:
-        flanked: (m,) stations with parent surface on both sides.
-    """
-    m = len(grid.depth) // BLOCK
-    use = grid.depth[: m * BLOCK].reshape(m, BLOCK, -1)
-    known = np.isfinite(use)
-    number = known.sum(axis=1)
-    mean = np.where(known, use, 0.0).sum(axis=1) / np.maximum(number, 1)
-    off = np.where(known, grid.at[: m * BLOCK].reshape(m, BLOCK, -1) - grid.x, 0.0).sum(axis=1) / np.maximum(number, 1)
-    shear = grid.shear[: m * BLOCK].reshape(m, BLOCK).mean(axis=1)
-    # Only blocks that hold a groove of about the usual depth shape the section: ends and gaps would blunt it.
-    inside = np.abs(grid.x) < 0.25 * start.width
-    height = (mean * number)[:, inside].sum(axis=1) / np.maximum(number[:, inside].sum(axis=1), 1)
-    candidates = flanked[: m * BLOCK].reshape(m, BLOCK).all(axis=1) & (height > 0.25 * start.depth)
-    candidates = _from_one_place(unit(grid.sight[: m * BLOCK].reshape(m, BLOCK, 3).mean(axis=1)), candidates)
-    if not candidates.any():
-        return None
-    typical = np.median(height[candidates])
-    keep = candidates & (height > 0.6 * typical) & (height < 1.6 * typical)
-    if not keep.any() or np.count_nonzero(number[keep]) < FEWEST_CELLS:
-        return None
-    return Blocks(grid.x, grid.x + off[keep], mean[keep], number[keep].astype(float), shear[keep], BLOCK)

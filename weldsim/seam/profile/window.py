@@ -12,9 +12,10 @@ from numpy import ndarray
 
 from weldsim.frames import unit
 from weldsim.seam.config import ProfileConfig
+from weldsim.seam.profile.blocks import mean_blocks
 from weldsim.seam.profile.join import Piece
 from weldsim.seam.profile.lean import section_at_blur
-from weldsim.seam.profile.refine import Fit, mean_blocks, sided
+from weldsim.seam.profile.refine import Fit, sided
 
 ODD = 0.15  # of the median blur, from which on a piece's own counts less in the mean
 ALIEN = 0.75  # of the mean; a piece further off has been seen otherwise and keeps its own
