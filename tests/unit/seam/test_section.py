@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import weldsim.seam.profile.lean as lean_module
 from weldsim.seam.profile.lean import first_section, section_at_blur, settled_section
 from weldsim.seam.profile.section import Section
-from weldsim.seam.profile.shape import section_of, twin, unknowns
-from weldsim.seam.profile.views import Blocks
+from weldsim.seam.profile.shape import Solution, section_of, twin, unknowns
+from weldsim.seam.profile.views import Blocks, gather
 
 X = np.arange(-0.030, 0.030, 0.0005) + 0.00025
 
@@ -152,6 +153,18 @@ def test_a_lean_that_a_slanted_look_may_make_up_has_to_stand_out(shear: float, s
         clear = noise < 2e-4
         assert (abs(found.lean) > 0.5 * lean) == clear
         assert abs(found.middle - truth.middle) < max(3 * sigma, 1e-4)
+
+
+@pytest.mark.parametrize("shear", [-0.35, 0.35])
+def test_a_lean_that_a_slanted_look_may_make_up_is_the_less_likely_of_two_that_fit_alike(shear: float) -> None:
+    blocks = blocks_of(section(), np.full(12, shear), 1e-4, np.random.default_rng(3))
+    views, base = gather(blocks, 0.008, 5e-5), unknowns(section())
+    lean = np.array([0.0, -0.4, 0.4])
+    found = [Solution(base + each * (np.arange(7) == 4), 0.0, np.ones(7, bool)) for each in lean.tolist()]
+    _, left, right = lean_module._likelihood(found, lean, views, blocks, 0.0)
+    made_up, other = (left, right) if shear > 0 else (right, left)
+    assert other == pytest.approx(lean_module.MADE_UP_ODDS * made_up, rel=0.01)
+    assert lean_module.MADE_UP_ODDS >= 2
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -25,7 +25,8 @@ STOCKY, FLOORS = (0.8, 1.0, 1.3), (0.05, 0.5)  # how much wider and less deep, a
 # symmetric V displaced twice as far as the sight lines do that.
 SLANT = 1.5  # of that displacement, within which a lean the same way has to stand out by
 TWIN_GAIN = 3.0  # log likelihood
-SLANT_SCORE = 9.0  # standard deviations; until then it counts in the doubt
+SLANT_SCORE = 9.0  # standard deviations; until then it counts in the doubt, though not in full:
+MADE_UP_ODDS = 5.0  # how much likelier such a lean was made up than not, before: no groove leans after the way it is seen
 SYMMETRIC_ODDS = 8.0  # how much likelier a groove is symmetric than leaning, for the doubt: it weighs leans that go unseen
 UNNOTICED = 0.02  # of the width: the lean of a groove that counts as symmetric
 BIN = 0.0035  # [m] across the seam, over which what no section can fit is alike
@@ -147,9 +148,13 @@ def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: f
 
 def _insists(gain: float, leaning: Solution, blocks: Blocks) -> bool:
     """Whether the data insist on a lean, the more so on one that a slanted look at a symmetric groove may have made up."""
+    return gain > (SLANT_SCORE if _made_up(leaning, blocks) else LEAN_SCORE) ** 2 / 2
+
+
+def _made_up(leaning: Solution, blocks: Blocks) -> bool:
+    """Whether a lean is one that a stereo matcher would make up, as it looks at a symmetric groove from a slant."""
     shape, drift = section_of(leaning.theta, 0.0), float(np.median(blocks.shear))
-    made_up = shape.lean * drift < 0 and abs(shape.lean) < SLANT * shape.depth * abs(drift)
-    return gain > (SLANT_SCORE if made_up else LEAN_SCORE) ** 2 / 2
+    return shape.lean * drift < 0 and abs(shape.lean) < SLANT * shape.depth * abs(drift)
 
 
 def _freed(found: list[Solution], views: Views, blocks: Blocks, step: float) -> Solution:
@@ -172,7 +177,8 @@ def _gain(symmetric: Solution, free: Solution, views: Views, blocks: Blocks, ste
 
 
 def _likelihood(found: list[Solution], lean: Float[ndarray, "s"], views: Views, blocks: Blocks, step: float) -> Float[ndarray, "s"]:
-    """How likely each solution is: a symmetric groove, or one of any lean alike, before; as well as it fits, after."""
+    """How likely each solution is: a symmetric groove, or one of any lean alike that is not made up, before; as well as it
+    fits, after."""
     best = min(found, key=lambda each: each.cost)
     worse = np.array([(e.cost - best.cost) / max(1.0, _excess(e, best, views, blocks, step)) for e in found])
     order = np.argsort(lean)
@@ -183,7 +189,8 @@ def _likelihood(found: list[Solution], lean: Float[ndarray, "s"], views: Views, 
         apart = np.abs(np.delete(lean, k) - lean[k])
         rise = np.sqrt(2 * np.maximum(np.delete(worse, k) - worse[k], 0.0) + 1e-12) / np.maximum(apart, 1e-3)
         span[k] = min(span[k], 2.5 / float(rise[np.argsort(apart)[:2]].min()))
-    prior = np.where(lean == 0.0, SYMMETRIC_ODDS, span / 2)
+    suspect = np.array([_made_up(each, blocks) for each in found])
+    prior = np.where(lean == 0.0, SYMMETRIC_ODDS, span / np.where(suspect, 2 * MADE_UP_ODDS, 2.0))
     mass = prior * np.exp(-worse)
     return mass / mass.sum()
 
