@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from weldsim.curves import arc_length
 from weldsim.frames import matrix_from_rotation_vector, unit
-from weldsim.seam.profile.meet import End, alike, faces, lead_across, round_corner
+from weldsim.seam.profile.meet import End, alike, faces, lead_across, meeting_point, round_corner
 
 MAX_GAP = 0.045
 
@@ -128,3 +128,44 @@ def test_no_corner_where_lines_miss_the_edge_is_hollow_or_too_little_room_is_lef
     hollow = (replace(a, normal=-a.normal), replace(b, normal=-b.normal))
     assert round_corner(*hollow, 0.004, MAX_GAP) is None
     assert round_corner(a, replace(b, direction=-a.direction), 0.004, MAX_GAP) is None, "parallel"
+
+
+def test_two_lines_at_a_right_angle_meet_as_surely_as_each_of_them_gets_there() -> None:
+    """Each line tells the point across itself: by its own deviation, and by its direction's over the way to the point."""
+    flat = End(
+        point=np.array([-0.02, 0.0, 0.0]),
+        direction=np.array([1.0, 0.0, 0.0]),
+        normal=np.array([0.0, 0.0, 1.0]),
+        bend=np.zeros(3),
+        sigma=3e-4,
+        turn=0.02,
+        width=0.014,
+        depth=0.008,
+    )
+    upright = replace(flat, point=np.array([0.001, -0.05, 0.0]), direction=np.array([0.0, 1.0, 0.0]), sigma=1e-4, turn=0.0)
+    meeting = meeting_point([flat, upright])
+    assert meeting is not None
+    np.testing.assert_allclose(meeting.point, [0.001, 0.0, 0.0], atol=1e-12)
+    assert meeting.sigma(flat.direction, flat.normal) == pytest.approx(np.hypot(3e-4, 0.021 * 0.02), rel=1e-6)
+    assert meeting.sigma(upright.direction, upright.normal) == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_of_lines_that_miss_each_other_the_one_led_from_far_away_gives_in() -> None:
+    """Three lines through one point; the third was read 0.1 m away, and its direction is a hundredth off."""
+    near = [
+        End(
+            point=-0.02 * np.array([np.cos(a), np.sin(a), 0.0]),
+            direction=np.array([np.cos(a), np.sin(a), 0.0]),
+            normal=np.array([0.0, 0.0, 1.0]),
+            bend=np.zeros(3),
+            sigma=1e-4,
+            turn=0.02,
+            width=0.014,
+            depth=0.008,
+        )
+        for a in (0.0, 2.0)
+    ]
+    far = replace(near[0], point=np.array([0.001, -0.1, 0.0]), direction=np.array([0.0, 1.0, 0.0]))
+    meeting = meeting_point([*near, far])
+    assert meeting is not None
+    assert np.linalg.norm(meeting.point) < 1e-4

@@ -13,12 +13,13 @@ from weldsim.seam.profile.branches import WIDTHS
 from weldsim.seam.profile.course import Course, end_to_end, stretch
 from weldsim.seam.profile.ends import station_mask
 from weldsim.seam.profile.join import DISTURBED, Piece
-from weldsim.seam.profile.meet import MOST_MISS, Corner, End, meeting_point, round_corner
+from weldsim.seam.profile.meet import MOST_MISS, UNKNOWN_BEND, Corner, End, Meeting, meeting_point, round_corner
 
 READ = 0.040  # [m] of a piece from which the direction of its end is read
 SHORTEST = 0.030  # [m] a shorter piece has no direction to be carried on in
 CORNER_STEP = 0.0005  # [m] between the points of a corner
 ALIKE = 0.55  # of the larger width and depth, the smaller one of two ends at an edge
+CLEAR = 1.6  # widths from a junction, within which one branch lies in the strip of another
 STEEPEST = 0.9  # cosine between a branch and the groove it runs into
 
 Mark = tuple[int, int]
@@ -54,7 +55,7 @@ def lay_courses(pieces: list[Piece], config: ProfileConfig) -> list[Course]:
     )
     links = _links(leads, config)
     free = {mark: lead for mark, lead in leads.items() if mark not in links}
-    tails = _tails([free, {mark: lead for mark, lead in deeper.items() if mark in free}])
+    tails = _tails([free, {mark: lead for mark, lead in deeper.items() if mark in free}], pieces)
     tails |= {
         mark: Tail(lead.at, _straight_on(lead, foot))
         for mark, lead in free.items()
@@ -157,7 +158,7 @@ def _links(leads: dict[Mark, Lead], config: ProfileConfig) -> dict[Mark, tuple[M
     return links
 
 
-def _tails(looks: list[dict[Mark, Lead]]) -> dict[Mark, Tail]:
+def _tails(looks: list[dict[Mark, Lead]], pieces: list[Piece]) -> dict[Mark, Tail]:
     """What leads from the ends of branches to the point where three or more of them meet on one surface.
 
     Args:
@@ -178,12 +179,24 @@ def _tails(looks: list[dict[Mark, Lead]]) -> dict[Mark, Tail]:
             continue
         for look in looks:
             group = {name: look[name] for name in names if name in look}
-            middle = meeting_point([each.end for each in group.values()]) if len(group) == len(names) else None
-            if middle is not None and all(_off(each, middle) < WIDTHS * each.end.width for each in group.values()):
-                tails |= {name: Tail(each.at, _straight_on(each, middle)) for name, each in group.items()}
+            meeting = meeting_point([each.end for each in group.values()]) if len(group) == len(names) else None
+            if meeting is not None and all(_off(each, meeting.point) < WIDTHS * each.end.width for each in group.values()):
+                group, meeting = _clear_of(meeting, group, pieces)
+                tails |= {name: Tail(each.at, _led_to(each, meeting)) for name, each in group.items()}
                 left = {name: each for name, each in left.items() if name not in names}
                 break
     return tails
+
+
+def _clear_of(meeting: Meeting, group: dict[Mark, Lead], pieces: list[Piece]) -> tuple[dict[Mark, Lead], Meeting]:
+    """Leads that stand where no branch disturbs another, and where these meet; as they were where that is nowhere."""
+    clear: dict[Mark, Lead] = {}
+    for mark, lead in group.items():
+        before = float((meeting.point - _tip(lead)) @ lead.end.direction)
+        apart = _lead(pieces[mark[0]], mark[1], max(lead.short, CLEAR * lead.end.width - before))
+        clear[mark] = lead if apart is None else apart
+    again = meeting_point([lead.end for lead in clear.values()])
+    return (group, meeting) if again is None else (clear, again)
 
 
 def _foot(lead: Lead, others: list[Piece]) -> Float[ndarray, "3"] | None:
@@ -216,16 +229,31 @@ def _off(lead: Lead, point: Float[ndarray, "3"]) -> float:
     return abs(float((point - _tip(lead)) @ lead.end.direction))
 
 
-def _straight_on(lead: Lead, middle: Float[ndarray, "3"]) -> Course:
-    """The straight course from a lead to a point [m]."""
+def _led_to(lead: Lead, meeting: Meeting) -> Course:
+    """The straight course from a lead to where branches meet, known the better the more of them do."""
+    end = lead.end
+    return _straight_on(lead, meeting.point, meeting.sigma(end.direction, end.normal))
+
+
+def _straight_on(lead: Lead, middle: Float[ndarray, "3"], sigma: float | None = None) -> Course:
+    """The straight course from a lead to a point [m].
+
+    Args:
+        sigma: standard deviation of the point across the course [m]; where it is None, as the lead's direction leaves it.
+    """
     end, way = lead.end, middle - lead.end.point
     length = float(np.linalg.norm(way))
     number = max(2, int(np.ceil(length / 0.001)) + 1)
     u = np.linspace(0.0, 1.0, number)
+    if sigma is None:
+        deviation = np.hypot(end.sigma, u * length * end.turn)
+    else:
+        bend = 0.5 * u * (1.0 - u) * length**2 * UNKNOWN_BEND
+        deviation = np.sqrt(((1.0 - u) * end.sigma) ** 2 + (u * sigma) ** 2 + bend**2)
     return Course(
         points=end.point + u[:, None] * way,
         normals=np.repeat(end.normal[None], number, 0),
-        sigma=np.hypot(end.sigma, u * length * end.turn),
+        sigma=deviation,
         width=np.full(number, end.width),
         step=np.zeros(number),  # where branches meet, their plates are one
     )

@@ -166,21 +166,47 @@ def round_corner(a: End, b: End, radius: float, max_gap: float, step: float = DE
     return Corner(points, normals, np.sqrt((1 - u) * first**2 + u * second**2), corner)
 
 
-def meeting_point(ends: list[End]) -> Float[ndarray, "3"] | None:
-    """The point [m] that the lines of several ends on one surface pass through, each straight on, or None where one of them
-    misses it by more than MOST_MISS of its width, or faces another way."""
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """Attributes: point (3,), that the lines of several ends pass through [m]; covariance (3, 3) of it [m^2]."""
+
+    point: Float[ndarray, "3"]
+    covariance: Float[ndarray, "3 3"]
+
+    def sigma(self, direction: Float[ndarray, "3"], normal: Float[ndarray, "3"]) -> float:
+        """Standard deviation [m] of the point across a line of that direction on a surface of that normal."""
+        across = unit(np.cross(normal, direction))
+        return float(np.sqrt(across @ self.covariance @ across))
+
+
+def meeting_point(ends: list[End]) -> Meeting | None:
+    """Where the lines of several ends on one surface meet, each straight on, or None where one of them misses that point by
+    more than MOST_MISS of its width, or faces another way."""
     if min(float(a.normal @ b.normal) for a in ends for b in ends) < np.cos(MOST_LEAN):
         return None
-    across = [(np.eye(3) - np.outer(end.direction, end.direction)) / end.sigma**2 for end in ends]
+    rough = _nearest_to_all(ends, np.array([end.sigma for end in ends]))
+    if rough is None:
+        return None
+    # How far each has to go is told by where they meet.
+    far = [float((rough.point - end.point) @ end.direction) for end in ends]
+    meeting = _nearest_to_all(ends, np.array([np.hypot(end.sigma, end.turn * d) for end, d in zip(ends, far, strict=True)]))
+    if meeting is None:
+        return None
+    for end in ends:
+        way = meeting.point - end.point
+        if float(np.linalg.norm(way - (way @ end.direction) * end.direction)) > MOST_MISS * end.width or way @ end.direction < 0:
+            return None
+    return meeting
+
+
+def _nearest_to_all(ends: list[End], sigma: Float[ndarray, "k"]) -> Meeting | None:
+    """The point with the least weighted sum of squared distances from straight lines, or None where they are parallel."""
+    across = [(np.eye(3) - np.outer(end.direction, end.direction)) / each**2 for end, each in zip(ends, sigma, strict=True)]
     total = np.sum(across, axis=0)
     if np.linalg.cond(total) > 1e3:
         return None
     point = np.linalg.solve(total, np.sum([each @ end.point for each, end in zip(across, ends, strict=True)], axis=0))
-    for end in ends:
-        way = point - end.point
-        if float(np.linalg.norm(way - (way @ end.direction) * end.direction)) > MOST_MISS * end.width or way @ end.direction < 0:
-            return None
-    return point
+    return Meeting(point, np.linalg.inv(total))
 
 
 def _straight(start: Float[ndarray, "3"], stop: Float[ndarray, "3"], step: float) -> Float[ndarray, "k 3"]:
