@@ -167,6 +167,27 @@ def test_a_lean_that_a_slanted_look_may_make_up_is_the_less_likely_of_two_that_f
     assert lean_module.MADE_UP_ODDS >= 2
 
 
+@pytest.mark.parametrize(
+    ("lean", "shear", "sigmas", "believed"),
+    [
+        (0.6, 0.0, 3.5, True),  # bevels of 45 and 15 deg
+        (0.2, 0.0, 3.5, False),
+        (0.2, 0.0, 5.0, True),
+        (-0.4, 0.5, 5.0, False),  # as a slanted look makes up
+        (-0.4, 0.5, 9.5, True),
+        (0.4, 0.5, 3.5, True),
+        (1.0, 0.0, 2.5, False),
+    ],
+)
+def test_how_far_a_lean_must_stand_out(lean: float, shear: float, sigmas: float, believed: bool) -> None:
+    """Grooves are symmetric or have bevels of unlike angles: between these the lean of a groove is likelier noise."""
+    blocks = blocks_of(section(), np.full(4, shear), 1e-4, np.random.default_rng(0))
+    theta = unknowns(section(lean=0.001))
+    theta[4] = lean
+    solution = Solution(theta, 0.0, np.ones(7, bool))
+    assert lean_module._insists(sigmas**2 / 2, solution, blocks) is believed
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_at_the_right_blur_a_groove_taken_for_a_narrower_deeper_one_gets_its_size_back(seed: int) -> None:
     rng = np.random.default_rng([seed, 11])

@@ -19,6 +19,8 @@ FIRST_LEANS = (0.0, -0.8, 0.8)
 FEW_LEANS = (0.0, -0.6, 0.6)  # looked at first
 WORTH_A_LOOK = 2.0  # log likelihood ratio of the best lean there from which all are looked at
 LEAN_SCORE = 4.5  # standard deviations by which a lean must stand out: most grooves are symmetric
+# Those that are not were made so: a single bevel leans by 1.0, one of 45 and 15 deg by 0.58, one of 30 and 15 deg by 0.37.
+PREPARED, PREPARED_SCORE = 0.35, 3.0  # from which lean on it need only stand out by that
 FIRST_STARTS = ((4e-4, 0.1), (5e-3, 0.1), (4e-4, 0.7), (8e-3, 0.3))  # blur [m], floor: one may stand in for the other
 STOCKY, FLOORS = (0.8, 1.0, 1.3), (0.05, 0.5)  # how much wider and less deep, and with which floor, another section begins
 # A stereo matcher follows the wall that faces it rather than the other one: the reference camera shows the bottom of a
@@ -148,7 +150,9 @@ def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: f
 
 def _insists(gain: float, leaning: Solution, blocks: Blocks) -> bool:
     """Whether the data insist on a lean, the more so on one that a slanted look at a symmetric groove may have made up."""
-    return gain > (SLANT_SCORE if _made_up(leaning, blocks) else LEAN_SCORE) ** 2 / 2
+    prepared = abs(leaning.theta[LEAN]) >= PREPARED
+    score = SLANT_SCORE if _made_up(leaning, blocks) else PREPARED_SCORE if prepared else LEAN_SCORE
+    return gain > score**2 / 2
 
 
 def _made_up(leaning: Solution, blocks: Blocks) -> bool:
