@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import weldsim.seam.profile.lean as lean_module
-from weldsim.seam.profile.lean import first_section, section_at_blur, settled_section
+from weldsim.seam.profile.lean import Doubt, first_section, section_at_blur, settled_section
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.shape import Solution, section_of, twin, unknowns
 from weldsim.seam.profile.views import Blocks, gather
@@ -111,9 +111,9 @@ def test_the_middle_of_the_lips_is_recovered_from_noisy_slanted_profiles(width: 
         truth = section(middle=rng.uniform(-5e-4, 5e-4), width=width, depth=0.5 * width, floor=0.1, blur=0.004)
         blocks = blocks_of(truth, shear + rng.uniform(-0.05, 0.05, 24), 2e-4, rng)
         start = first_section(blocks, section(width=1.2 * width, depth=0.4 * width), 5e-5)
-        found, sigma = settled_section(blocks, start, 5e-5)
+        found, doubt = settled_section(blocks, start, 5e-5)
         errors.append(found.middle - truth.middle)
-        assert 0 < sigma < 1e-3
+        assert 0 < doubt.deviation < 1e-3
         assert abs(found.width - width) < 0.15 * width
     assert np.abs(errors).max() < 6e-5
 
@@ -123,10 +123,10 @@ def test_a_leaning_groove_is_seen_to_lean(lean: float) -> None:
     rng = np.random.default_rng(2)
     truth = section(lean=lean, middle=0.0004)
     blocks = blocks_of(truth, np.zeros(24), 1e-4, rng)
-    found, sigma = settled_section(blocks, first_section(blocks, section(), 5e-5), 5e-5)
+    found, doubt = settled_section(blocks, first_section(blocks, section(), 5e-5), 5e-5)
     assert found.lean == pytest.approx(truth.lean, abs=2e-4)
     assert found.middle == pytest.approx(truth.middle, abs=1e-4)
-    assert abs(found.middle - truth.middle) < 3 * sigma
+    assert abs(found.middle - truth.middle) < 3 * doubt.deviation
 
 
 def test_a_lean_that_noise_hides_is_doubted() -> None:
@@ -136,8 +136,8 @@ def test_a_lean_that_noise_hides_is_doubted() -> None:
         rng = np.random.default_rng([seed, 7])
         truth = section(width=0.010, depth=0.005, lean=rng.choice([-1, 1]) * 0.0045, blur=0.007)
         blocks = blocks_of(truth, np.zeros(8), 4e-4, rng)
-        found, sigma = settled_section(blocks, first_section(blocks, section(width=0.012, depth=0.004), 5e-5), 5e-5)
-        scores.append(abs(found.middle - truth.middle) / sigma)
+        found, doubt = settled_section(blocks, first_section(blocks, section(width=0.012, depth=0.004), 5e-5), 5e-5)
+        scores.append(abs(found.middle - truth.middle) / doubt.deviation)
     assert np.median(scores) < 3
     assert max(scores) < 5
 
@@ -149,10 +149,10 @@ def test_a_lean_that_a_slanted_look_may_make_up_has_to_stand_out(shear: float, s
     for lean, noise, few in ((0.0022, 8e-4, 12), (0.0055, 1e-4, 24)):
         truth = section(lean=-np.sign(shear) * lean, blur=0.004)
         blocks = blocks_of(truth, np.full(few, shear), noise, rng)
-        found, sigma = settled_section(blocks, first_section(blocks, section(), 5e-5), 5e-5)
+        found, doubt = settled_section(blocks, first_section(blocks, section(), 5e-5), 5e-5)
         clear = noise < 2e-4
         assert (abs(found.lean) > 0.5 * lean) == clear
-        assert abs(found.middle - truth.middle) < max(3 * sigma, 1e-4)
+        assert abs(found.middle - truth.middle) < max(3 * doubt.deviation, 1e-4)
 
 
 @pytest.mark.parametrize("shear", [-0.35, 0.35])
@@ -165,6 +165,13 @@ def test_a_lean_that_a_slanted_look_may_make_up_is_the_less_likely_of_two_that_f
     made_up, other = (left, right) if shear > 0 else (right, left)
     assert other == pytest.approx(lean_module.MADE_UP_ODDS * made_up, rel=0.01)
     assert lean_module.MADE_UP_ODDS >= 2
+
+
+def test_scatter_that_the_stations_show_too_counts_once() -> None:
+    doubt = Doubt(lean=3e-4, data=5e-4)
+    assert doubt.deviation == pytest.approx(np.sqrt(34) * 1e-4)
+    assert doubt.beyond(9e-8) == pytest.approx(5e-4), "of 0.5 mm 0.4 mm are new"
+    assert doubt.beyond(1e-6) == pytest.approx(3e-4), "only the lean is"
 
 
 @pytest.mark.parametrize(

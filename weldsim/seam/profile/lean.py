@@ -4,7 +4,7 @@ Under blur and noise a lean is nearly exchangeable with the lips' middle. So the
 of leans, and the middle is averaged over them, each as likely as it fits: its scatter is the doubt.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -35,6 +35,30 @@ BIN = 0.0035  # [m] across the seam, over which what no section can fit is alike
 MOST_DOUBT = 0.15  # of the width
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """How far off the middle of a section may be.
+
+    Attributes:
+        lean: standard deviation for want of knowing the groove's lean [m].  data: at a known lean, by the scatter of the data.
+    """
+
+    lean: float
+    data: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the middle [m]."""
+        return float(np.hypot(self.lean, self.data))
+
+    def beyond(self, variance: float) -> float:
+        """What is left of it [m] where the data's scatter has been counted as a `variance` [m^2] already."""
+        return float(np.sqrt(self.lean**2 + max(self.data**2 - variance, 0.0)))
+
+
+CERTAIN = Doubt(0.0, 0.0)
+
+
 def follow_section(blocks: Blocks, start: Section, noise: float) -> Section:
     """The section that fits blocks of a strip, begun at `start` and with its lean.
 
@@ -57,8 +81,8 @@ def first_section(blocks: Blocks, start: Section, noise: float) -> Section:
     return section_of((free if insists else symmetric).theta, start.step)
 
 
-def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Section, float]:
-    """The section that fits blocks of a strip, near `start` but for its lean, and its middle's standard deviation [m]."""
+def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Section, Doubt]:
+    """The section that fits blocks of a strip, near `start` but for its lean, and how far off its middle may be."""
     views = gather(blocks, start.depth, noise)
     found, insists = _over_leans(unknowns(start), views, blocks, start.step)
     lean = np.array([each.theta[LEAN] for each in found])
@@ -71,8 +95,10 @@ def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Secti
     between = float(mass @ (middle - last.theta[0]) ** 2)
     exchange = abs(float(np.polyfit(lean, middle, 1)[0]))
     unnoticed = float(mass[lean == 0.0].sum()) * (2 * UNNOTICED * exchange) ** 2
-    variance = between + unnoticed + _variance(last, views, blocks, start.step)
-    return section_of(last.theta, start.step), float(min(np.sqrt(variance), MOST_DOUBT * last.theta[1]))
+    most = MOST_DOUBT * float(last.theta[1])
+    by_lean = min(float(np.sqrt(between + unnoticed)), most)
+    by_data = min(float(np.sqrt(_variance(last, views, blocks, start.step))), most)
+    return section_of(last.theta, start.step), Doubt(by_lean, by_data)
 
 
 def section_at_blur(blocks: Blocks, start: Section, noise: float, blur: float) -> Section:

@@ -12,13 +12,13 @@ from weldsim.curves import resample
 from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.blocks import mean_blocks
 from weldsim.seam.profile.grid import Grid, make_grid
-from weldsim.seam.profile.lean import first_section, follow_section, settled_section
+from weldsim.seam.profile.lean import CERTAIN, Doubt, first_section, follow_section, settled_section
 from weldsim.seam.profile.parent import Parent, fit_parent
 from weldsim.seam.profile.rail import Rail, lay_out, make_rail, shift_rail
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
 from weldsim.seam.profile.strength import Choice
-from weldsim.seam.profile.track import Track, between, follow, smoothed, track_deviation
+from weldsim.seam.profile.track import Track, between, follow, mean_variance, smoothed, track_deviation
 from weldsim.seam.profile.views import agree
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
@@ -197,7 +197,7 @@ class Measurement:
 
     Attributes:
         offset: (m,) lateral position of the smoothed groove relative to the rail [m].  choice: how it was smoothed.
-        doubt: standard deviation of the section's middle [m].
+        doubt: how far off the section's middle may be.
     """
 
     rail: Rail
@@ -208,7 +208,7 @@ class Measurement:
     inner: float
     offset: Float[ndarray, "m"]
     choice: Choice
-    doubt: float
+    doubt: Doubt
 
     @property
     def moved(self) -> float:
@@ -263,7 +263,9 @@ def _measure(
 def _concluded(last: Measurement, bridge: float) -> Fit:
     """The fit: the rail moved onto the smoothed groove, with its standard deviation."""
     lateral = track_deviation(last.track, last.choice)
-    sigma = np.sqrt(lateral**2 + last.parent.sigma**2 + last.doubt**2)
+    # Section and stations come of the same cells: noise that is in both counts once.
+    doubt = last.doubt.beyond(mean_variance(last.track, last.choice))
+    sigma = np.sqrt(lateral**2 + last.parent.sigma**2 + doubt**2)
     height = _opening_height(last.parent, last.section, last.offset)
     rail = shift_rail(last.rail, last.offset, height, _slope(last.parent, last.offset), respace=False)
     track = replace(last.track, offset=last.track.offset - last.offset)
@@ -364,15 +366,15 @@ def _evened(image: Float[ndarray, "m w"]) -> Float[ndarray, "m w"]:
     return cv2.boxFilter(image, -1, (1, 9), borderType=cv2.BORDER_CONSTANT)
 
 
-def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, float]:
-    """The section fitted to blocks of stations, and its middle's standard deviation [m].
+def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, Doubt]:
+    """The section fitted to blocks of stations, and how far off its middle may be.
 
     Args:
         noise: the least standard deviation of a cell [m]: that of the plate.
     """
     blocks = mean_blocks(grid, flanked, start)
     if blocks is None:
-        return start, 0.0
+        return start, CERTAIN
     if stage == "settled":
         return settled_section(blocks, start, noise)
-    return (first_section if stage == "first" else follow_section)(blocks, start, noise), 0.0
+    return (first_section if stage == "first" else follow_section)(blocks, start, noise), CERTAIN

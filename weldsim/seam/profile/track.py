@@ -13,7 +13,7 @@ from weldsim.seam.profile.parent import TOLERANCE
 from weldsim.seam.profile.rail import Rail
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import ORDER, deviation, smooth
-from weldsim.seam.profile.strength import Choice, choose, correlation
+from weldsim.seam.profile.strength import Choice, choose, correlated_sum, correlation
 from weldsim.seam.profile.views import correlation_across, deviation_across
 
 BLOCK = 8  # stations averaged together to judge how well the section fits
@@ -382,3 +382,9 @@ def track_deviation(track: Track, choice: Choice) -> Float[ndarray, "m"]:
     # Beyond, the line goes straight on, and is wrong in its direction too.
     before, after = core.start - np.arange(core.start), np.arange(1, len(track.weight) - core.stop + 1)
     return np.concatenate([sigma[0] * np.hypot(1.0, before / TURN), sigma, sigma[-1] * np.hypot(1.0, after / TURN)])
+
+
+def mean_variance(track: Track, choice: Choice) -> float:
+    """Variance of the stations' mean lateral position [m^2], with the correlation of their noise."""
+    number = np.count_nonzero(track.weight)
+    return choice.variance * min(correlated_sum(choice.length) / max(number, 1), 1.0)
