@@ -13,6 +13,7 @@ from weldsim.kinematics import inverse, torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.mounts import X_FT
+from weldsim.path.config import PathConfig
 from weldsim.path.plan import plan_path
 from weldsim.records import JointTrajectory, Seam, Segment, TorchPath
 
@@ -100,6 +101,27 @@ def test_the_joints_do_not_slow_a_weld_over_an_edge_down(angle: float, heading: 
     seam = _over_an_edge(angle, heading, np.array([0.0, -0.5, 0.25]))
     plan = plan_motion(plan_path(seam), START)
     assert plan.slowest >= 0.95
+
+
+@pytest.mark.parametrize("jerk", [60.0, 350.0])
+@pytest.mark.parametrize("speed", [0.008, 0.05, 0.2])
+@pytest.mark.parametrize("heading", [0.0, 2.2])
+def test_a_wire_that_begins_to_turn_at_once_slows_the_weld_as_far_as_the_limits_ask_for(
+    heading: float, speed: float, jerk: float
+) -> None:
+    """Passed at a steady speed such a bend leaves the joints all their acceleration and jerk: none is set aside for a ramp."""
+    seam = _over_an_edge(1.2, heading, np.array([0.0, -0.5, 0.25]))
+    config = MotionConfig(joint_jerk_limit=jerk)
+    plan = plan_motion(plan_path(seam, PathConfig(smoothing=0.0, speed=speed)), START, config)
+    trajectory = plan.trajectory
+    most = np.abs(np.diff(trajectory.qdd, axis=0)).max() / config.period
+    assert most <= jerk
+    assert np.abs(trajectory.qdd).max() <= config.joint_acceleration_limit
+    assert np.abs(trajectory.qd).max() <= config.joint_speed_limit
+    tip = np.diff(trajectory.s) / config.period
+    assert tip[_is(trajectory, Segment.WELD)[1:]].max() <= speed * (1 + 1e-6)
+    if jerk == 350.0 and speed == 0.008:
+        assert plan.slowest > 0.5
 
 
 def test_speed_of_each_part_of_the_path() -> None:
