@@ -47,7 +47,6 @@ from figures import ROWS, record
 RESULTS = Path(__file__).parent / "results"
 SCENES = ("straight", "curve", "cylinder", "cuboid", "y")
 ROBOTS = ("sim", "cb3", "e")
-# The wire turns so far at an edge of the box that joint limits slow the weld there: wanted here, a failure of a dry run otherwise.
 LIMITS = {"p95": 0.3e-3, "joint_speed": 3.0, "joint_acceleration": 10.0, "joint_jerk": 350.0, "torch_speed": 0.25, "ends": 1e-3}
 WORDS = {
     "p95": ("tip p95", 1e3, "mm"),

@@ -248,7 +248,9 @@ def test_a_scene_has_limits_of_its_own_and_the_config_goes_before_them() -> None
     assert limits_for(load_config(overrides=["report.max=3 mm"]), cuboid).max == 0.003
 
     assert paced_for(general, None) == paced_for(general, straight) == general
-    assert paced_for(general, cuboid).motion.least_speed == cuboid.limits.least_speed
-    assert paced_for(load_config(overrides=["motion.least_speed=0.7"]), cuboid).motion.least_speed == 0.7
+    slow = load_scene("cuboid", overrides=["limits.least_speed=0.1"])
+    assert paced_for(general, cuboid) == general
+    assert paced_for(general, slow).motion.least_speed == 0.1
+    assert paced_for(load_config(overrides=["motion.least_speed=0.7"]), slow).motion.least_speed == 0.7
     with pytest.raises(ConfigError, match="least_speed"):
         load_scene("cuboid", overrides=["limits.least_speed=1.5"])

@@ -45,7 +45,7 @@ def test_a_limit_that_is_given_wins_though_it_equals_the_default():
         assert all(getattr(limits_for(given, cuboid), other) == getattr(cuboid.limits, other) for other in others)
     pace = load_config(overrides=["motion.least_speed=0.5"])
     assert pace.motion == CellConfig().motion
-    assert paced_for(pace, cuboid).motion.least_speed == 0.5
+    assert paced_for(pace, load_scene("cuboid", ["limits.least_speed=0.1"])).motion.least_speed == 0.5
 
 
 def test_a_limit_in_a_file_wins_over_the_scene_and_the_command_line_over_both(tmp_path):

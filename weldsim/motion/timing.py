@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import ruckig
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.arm import UR5, Arm
@@ -108,7 +108,8 @@ def piece_move(rail: Rail, path: JointPath, config: MotionConfig) -> Move:
     # A third of the joints' jerk likewise; the rest is for bends, and for ramps on bends.
     soft = RAMPING * HEADROOM * config.joint_jerk_limit / max(float(np.abs(path.spline(everywhere, 1)).max()), 1e-9)
     tip = _TipLimits(acceleration=share * config.tip_acceleration, jerk=min(share * config.tip_jerk, soft))
-    edges, limit, asked = _speed_limits(rail, path, tip, config)
+    edges, asked, steady, ramping = _speed_limits(rail, path, tip, config)
+    limit = _allowed(edges, steady, ramping, tip)
     s, ds, dds = _arc_profile(edges, limit, tip, config.period).T
     q1, q2 = path.spline(s, 1), path.spline(s, 2)
     return Move(
@@ -126,8 +127,9 @@ def piece_move(rail: Rail, path: JointPath, config: MotionConfig) -> Move:
 
 def _speed_limits(
     rail: Rail, path: JointPath, tip: _TipLimits, config: MotionConfig
-) -> tuple[Float[ndarray, "b_plus_1"], Float[ndarray, "b"], Float[ndarray, "b"]]:
-    """Edges of blocks along the piece [m], the speed allowed in each and the speed asked for [m/s]."""
+) -> tuple[Float[ndarray, "b_plus_1"], Float[ndarray, "b"], Float[ndarray, "b"], Float[ndarray, "b"]]:
+    """Edges of blocks along the piece [m]; in each the speed asked for, and at most so much of it as the joints allow where the
+    tip keeps its speed and where it changes it [m/s]."""
     start, end = float(path.spline.x[0]), float(path.spline.x[-1])
     inside = (rail.s > start + 1e-6) & (rail.s < end - 1e-6)
     changes = rail.s[inside][np.diff(rail.speed[inside], prepend=rail.speed[inside][:1]) != 0]
@@ -138,15 +140,55 @@ def _speed_limits(
     # Inside the weld the slower neighbour counts; a lead has its own speed at its far end alone.
     pick = np.minimum if path.segment == Segment.WELD else np.maximum
     asked = pick(rail.speed[i], rail.speed[i + 1])
-    rate, bend, twist = (_greatest(path, edges, order) for order in (1, 2, 3))
-    left = HEADROOM * config.joint_acceleration_limit - rate * tip.acceleration
-    allowed = np.minimum(HEADROOM * config.joint_speed_limit / np.maximum(rate, 1e-9), np.sqrt(left / np.maximum(bend, 1e-9)))
+    rate, bend, twist = (np.maximum(_greatest(path, edges, order), 1e-9) for order in (1, 2, 3))
+    speed, acceleration, jerk = (
+        HEADROOM * limit for limit in (config.joint_speed_limit, config.joint_acceleration_limit, config.joint_jerk_limit)
+    )
+    steady = np.minimum.reduce([asked, speed / rate, np.sqrt(acceleration / bend), np.cbrt(jerk / twist)])
     # The third derivative of q(s(t)) has three terms, q' by jerk, 3 q'' by speed and acceleration, q''' by the cube of speed:
     # each with its share of the joint's jerk.
-    jerk = HEADROOM * config.joint_jerk_limit
-    allowed = np.minimum(allowed, np.cbrt(TWISTING * jerk / np.maximum(twist, 1e-9)))
-    allowed = np.minimum(allowed, BENDING * jerk / np.maximum(3 * bend * tip.acceleration, 1e-9))
-    return edges, np.minimum(asked, allowed), asked
+    bends = np.sqrt((acceleration - rate * tip.acceleration) / bend)
+    ramping = np.minimum.reduce(
+        [steady, bends, np.cbrt(TWISTING * jerk / twist), BENDING * jerk / np.maximum(3 * bend * tip.acceleration, 1e-9)]
+    )
+    return edges, asked, steady, ramping
+
+
+def _allowed(
+    edges: Float[ndarray, "b_plus_1"], steady: Float[ndarray, "b"], ramping: Float[ndarray, "b"], tip: _TipLimits
+) -> Float[ndarray, "b"]:
+    """The greatest speed in each block [m/s]: `steady` where the tip passes it without a change of speed, else `ramping`.
+
+    A block beside a slower one is passed at that one's speed where that is faster than its own `ramping`.
+    """
+    limit = steady.copy()
+    limit[[0, -1]] = ramping[[0, -1]]
+    while True:
+        limit = _levelled(limit, ramping)
+        wrong = _changing(edges, limit, tip) & (limit > ramping)
+        if not wrong.any():
+            return limit
+        limit[wrong] = ramping[wrong]
+
+
+def _levelled(limit: Float[ndarray, "b"], ramping: Float[ndarray, "b"]) -> Float[ndarray, "b"]:
+    """The limits with those above `ramping` lowered to what the blocks beside them have, but not below it."""
+    while True:
+        beside = np.minimum(np.append(limit[1:], np.inf), np.append(np.inf, limit[:-1]))
+        lowered = np.maximum(np.minimum(limit, ramping), np.minimum(limit, beside))
+        if (lowered == limit).all():
+            return limit
+        limit = lowered
+
+
+def _changing(edges: Float[ndarray, "b_plus_1"], limit: Float[ndarray, "b"], tip: _TipLimits) -> Bool[ndarray, "b"]:
+    """In which blocks the tip changes its speed."""
+    out = np.zeros(len(limit), bool)
+    for a, b, v0, v1, cap in _runs(edges, limit, tip):
+        up, down = a + _ramp(v0, cap, tip), b - _ramp(cap, v1, tip)
+        mine = (edges[:-1] < b) & (edges[1:] > a)
+        out |= mine & ((up > down) | (edges[:-1] < up) | (edges[1:] > down))
+    return out
 
 
 def _greatest(path: JointPath, edges: Float[ndarray, "b_plus_1"], order: int) -> Float[ndarray, "b"]:
@@ -173,12 +215,8 @@ def _arc_profile(
     edges: Float[ndarray, "b_plus_1"], limit: Float[ndarray, "b"], tip: _TipLimits, period: float
 ) -> Float[ndarray, "k 3"]:
     """Arc length, speed and acceleration of the tip (k, 3) every period: at the limit wherever the ramps allow."""
-    # One profile for each run of blocks with the same limit.
-    new = np.concatenate([[True], np.abs(np.diff(limit)) > 1e-9])
-    edges, limit = np.append(edges[:-1][new], edges[-1]), limit[new]
-    between = _reachable(edges, np.concatenate([[0.0], np.minimum(limit[:-1], limit[1:]), [0.0]]), tip)
     rows, clock = [], 0.0
-    for a, b, v0, v1, cap in zip(edges[:-1], edges[1:], between[:-1], between[1:], limit, strict=True):
+    for a, b, v0, v1, cap in _runs(edges, limit, tip):
         request = ruckig.InputParameter(1)
         request.current_position, request.target_position = [float(a)], [float(b)]
         request.current_velocity, request.target_velocity = [float(v0)], [float(v1)]
@@ -193,6 +231,14 @@ def _arc_profile(
     profile = np.concatenate(rows)
     profile[:, 0] = np.clip(profile[:, 0], edges[0], edges[-1])
     return profile
+
+
+def _runs(edges: Float[ndarray, "b_plus_1"], limit: Float[ndarray, "b"], tip: _TipLimits) -> Float[ndarray, "r 5"]:
+    """Of each run of blocks with the same limit: where it starts and ends [m], the speed at both and the limit [m/s]."""
+    new = np.concatenate([[True], np.abs(np.diff(limit)) > 1e-9])
+    edges, limit = np.append(edges[:-1][new], edges[-1]), limit[new]
+    between = _reachable(edges, np.concatenate([[0.0], np.minimum(limit[:-1], limit[1:]), [0.0]]), tip)
+    return np.stack([edges[:-1], edges[1:], between[:-1], between[1:], limit], axis=1)
 
 
 def _reachable(edges: Float[ndarray, "b_plus_1"], speed: Float[ndarray, "b_plus_1"], tip: _TipLimits) -> Float[ndarray, "b_plus_1"]:

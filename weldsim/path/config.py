@@ -35,7 +35,8 @@ class PathConfig:
 
     turn_limit: RadianPerMetre = 2 * DEGREE_PER_MM
     """Greatest turn of the wire axis per length of seam, before work and travel angle; the default is 2 deg/mm, a right angle
-    within 45 mm. Where the seam turns faster, round an edge, the axis begins to turn before it and ends after it."""
+    within 45 mm. Where the seam turns faster, round an edge, the axis begins to turn before it and ends after it, both gradually,
+    over the length of `smoothing`."""
 
     work_angle: Radian = 0.0
     """Lean of the torch across travel, away from the seam's bisector: right-handed about travel, so positive leans it to

@@ -48,12 +48,18 @@ def turn(directions: Float[ndarray, "n 3"]) -> Float[ndarray, "n-1"]:
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
 
 
-def limited(s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], rate: RadianPerMetre) -> Float[ndarray, "n 3"]:
-    """Unit directions that turn by at most `rate` [rad/m] of arc length, as given wherever they already do.
+def limited(
+    s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], rate: RadianPerMetre, ease: Metre = 0.0
+) -> Float[ndarray, "n 3"]:
+    """Unit directions that turn by at most `rate` [rad/m] of arc length; as given where none turns faster.
 
     A limiter run forwards lags, one run backwards leads: their middle does neither, and turns half as fast as either, so both
     may turn at twice the rate. The last pass makes good what their middle may exceed. Between opposite directions every way is as
     short: the one taken leads by the axis of the frame that they are most square to.
+
+    Args:
+        ease: length over which turns at the limit begin and end [m], the standard deviation of `smooth`. With 0 they do so at
+            once: joints that follow then need an acceleration without bound, and slow the weld down.
     """
     steps = rate * np.diff(s)
     if (turn(directions) <= steps).all():
@@ -63,7 +69,9 @@ def limited(s: Float[ndarray, "n"], directions: Float[ndarray, "n 3"], rate: Rad
     middle = forwards + backwards
     for i in np.flatnonzero(np.linalg.norm(middle, axis=1) < OPPOSITE):
         middle[i] = _aside(forwards[i])
-    return _chase(unit(middle), steps)
+    out = _chase(unit(middle), steps)
+    # A mean of directions turns no faster than they do; a local line may, at an end.
+    return limited(s, smooth(s, out, ease), rate) if ease > 0 else out
 
 
 def _chase(directions: Float[ndarray, "n 3"], steps: Float[ndarray, "n-1"]) -> Float[ndarray, "n 3"]:

@@ -37,7 +37,7 @@ def plan_path(seam: Seam, config: PathConfig | None = None) -> TorchPath:
     around, middle = s, slice(None)
     if seam.closed and config.start_trim == config.end_trim == 0:
         around, travel, wire, middle = _three_rounds(s, travel, wire)
-    wire = limited(around, smooth(around, wire, config.smoothing), MARGIN * config.turn_limit)[middle]
+    wire = limited(around, smooth(around, wire, config.smoothing), MARGIN * config.turn_limit, ease=config.smoothing)[middle]
     travel = smooth(around, travel, config.smoothing)[middle]
     R = _frames(s, travel, wire) @ lean(config.work_angle, config.travel_angle)
     tip = points + (config.nominal_ctwd - config.ctwd) * R[:, :, 2]

@@ -8,11 +8,12 @@ import pytest
 from tests.torch_paths import START, flat_curve, random_path, torch_path
 from weldsim.curves import arc_length
 from weldsim.errors import ConfigError, MotionError, UnreachableError
-from weldsim.frames import Transform
+from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.kinematics import inverse, torch_pose
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.plan import MotionPlan, plan_motion
 from weldsim.mounts import X_FT
+from weldsim.path.config import PathConfig
 from weldsim.path.plan import plan_path
 from weldsim.records import JointTrajectory, Seam, Segment, TorchPath
 
@@ -78,6 +79,49 @@ def test_torch_speed_is_constant_on_the_weld(seed: int) -> None:
     assert plan.slowest == 1.0
     assert plan.ramp < 0.002
     assert np.abs(speed / path.speed[0] - 1).max() < 0.01
+
+
+def _over_an_edge(angle: float, heading: float, middle: np.ndarray) -> Seam:
+    """80 mm on either side of an edge that is rounded by 3 mm, faces `angle` [rad] apart; the edge is square to `heading` [rad]."""
+    along = np.arange(-0.08, 0.08, 0.0005)
+    tilt = angle * np.clip(along / (0.003 * angle), -0.5, 0.5)
+    flat = np.stack([np.cos(tilt), 0 * tilt, -np.sin(tilt)], axis=1)
+    points = np.cumsum(flat * 0.0005, axis=0)
+    points -= points[len(points) // 2]
+    turn = matrix_from_rotation_vector(np.array([0.0, 0.0, heading]))
+    normals = np.stack([np.sin(tilt), 0 * tilt, np.cos(tilt)], axis=1)
+    points = points @ turn.T + middle
+    return Seam(points_B=points, s=arc_length(points), tangents_B=flat @ turn.T, normals_B=normals @ turn.T)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.8, 2.2])
+@pytest.mark.parametrize("angle", [0.6, 1.2, 1.57])
+def test_the_joints_do_not_slow_a_weld_over_an_edge_down(angle: float, heading: float) -> None:
+    """The wire turns at the path's limit there, which takes an eighth of the joints' speed; it must not begin to do so at once."""
+    seam = _over_an_edge(angle, heading, np.array([0.0, -0.5, 0.25]))
+    plan = plan_motion(plan_path(seam), START)
+    assert plan.slowest >= 0.95
+
+
+@pytest.mark.parametrize("jerk", [60.0, 350.0])
+@pytest.mark.parametrize("speed", [0.008, 0.05, 0.2])
+@pytest.mark.parametrize("heading", [0.0, 2.2])
+def test_a_wire_that_begins_to_turn_at_once_slows_the_weld_as_far_as_the_limits_ask_for(
+    heading: float, speed: float, jerk: float
+) -> None:
+    """Passed at a steady speed such a bend leaves the joints all their acceleration and jerk: none is set aside for a ramp."""
+    seam = _over_an_edge(1.2, heading, np.array([0.0, -0.5, 0.25]))
+    config = MotionConfig(joint_jerk_limit=jerk)
+    plan = plan_motion(plan_path(seam, PathConfig(smoothing=0.0, speed=speed)), START, config)
+    trajectory = plan.trajectory
+    most = np.abs(np.diff(trajectory.qdd, axis=0)).max() / config.period
+    assert most <= jerk
+    assert np.abs(trajectory.qdd).max() <= config.joint_acceleration_limit
+    assert np.abs(trajectory.qd).max() <= config.joint_speed_limit
+    tip = np.diff(trajectory.s) / config.period
+    assert tip[_is(trajectory, Segment.WELD)[1:]].max() <= speed * (1 + 1e-6)
+    if jerk == 350.0 and speed == 0.008:
+        assert plan.slowest > 0.5
 
 
 def test_speed_of_each_part_of_the_path() -> None:

@@ -1,7 +1,10 @@
 """Directions along a line in closed form: which side, what smoothing keeps, how a limited turn goes."""
 
+from itertools import product
+
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from weldsim.frames import unit
 from weldsim.path.directions import limited, one_sided, smooth, turn
@@ -40,6 +43,31 @@ def test_a_step_becomes_a_turn_at_the_limits_rate_with_its_middle_at_the_step(st
     np.testing.assert_allclose(np.diff(found[turning]) / np.diff(s[turning]), np.sign(step) * rate, rtol=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("step", [0.9, -1.5])
+def test_an_eased_turn_begins_and_ends_gradually_and_never_exceeds_the_limit(step: float, seed: int) -> None:
+    """Its rate is the limit's where the turn is, smoothed by a Gaussian of that standard deviation."""
+    rate, at, ease = 20.0, 0.1, 0.004
+    s = uneven(0.0, 0.2, seed)
+    directions = leaning(np.where(s < at, 0.0, step))
+    found = angle_of(limited(s, directions, rate, ease))
+    half = abs(step) / (2 * rate)
+    middle = (s[:-1] + s[1:]) / 2
+    wanted = np.sign(step) * rate * (norm.cdf((middle - at + half) / ease) - norm.cdf((middle - at - half) / ease))
+    np.testing.assert_allclose(np.diff(found) / np.diff(s), wanted, atol=0.1 * rate)
+    assert (np.abs(np.diff(found)) <= rate * np.diff(s) + 1e-9).all()
+    assert np.abs(np.diff(angle_of(limited(s, directions, rate))) / np.diff(s) - wanted).max() > 0.4 * rate
+    np.testing.assert_allclose(found[[0, -1]], [0.0, step], atol=1e-6)
+
+
+@pytest.mark.parametrize("ease", [0.002, 0.005])
+def test_an_eased_turn_at_an_end_of_the_line_keeps_the_limit(ease: float) -> None:
+    for seed, at in product(range(4), (0.002, 0.01, 0.095)):
+        s = uneven(0.0, 0.1, seed)
+        found = limited(s, leaning(np.where(s < at, 0.0, 1.2)), 20.0, ease)
+        assert (turn(found) <= 20.0 * np.diff(s) + 1e-9).all()
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_bump_too_short_for_the_limit_becomes_a_lower_one_about_the_same_place(seed: int) -> None:
     """Out by 1 rad over 10 mm and back: neither limiter, at twice the rate, gets farther than 0.4 rad; their middle is 0.2."""
@@ -55,6 +83,7 @@ def test_a_turn_that_obeys_the_limit_is_left_as_it_is() -> None:
     z = leaning(5.0 * s)
     most = float(turn(z).max() / 1e-3)
     assert limited(s, z, 1.0001 * most) is z
+    assert limited(s, z, 1.0001 * most, 0.005) is z
     assert limited(s, z, 0.9 * most) is not z
 
 
