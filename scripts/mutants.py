@@ -49,7 +49,7 @@ GROUPS: dict[str, tuple[list[str], list[str]]] = {
         ["property/test_frames.py", "conventions/test_frames.py", "conventions/test_rotations.py", "unit/test_frames.py"],
     ),
     "kinematics": (["kinematics"], ["unit/test_kinematics.py", "unit/test_arm.py"]),
-    "gate": (["execution/gate"], ["unit/execution/test_gate.py", "unit/execution/test_gate_told.py"]),
+    "gate": (["execution/gate"], [f"unit/execution/{name}.py" for name in ("test_gate", "test_gate_told", "test_gate_kept")]),
     "ends": (["seam/profile/ends"], ["unit/seam/test_ends.py"]),
     "window": (["seam/profile/window"], ["unit/seam/test_window.py"]),
     "arm": (["motion/arm"], ["unit/motion/test_arm.py"]),
@@ -85,6 +85,8 @@ class Mutant:
             return "subscripts of einsum in capitals name the same axes"
         if "strict=True" in self.was and self.becomes in (self.was.replace("strict=True", other) for other in STRICT):
             return "what is zipped is of one length; strict says so"
+        if self.becomes == self.was.replace('float("nan")', 'float("NAN")') != self.was:
+            return "no number in capitals is no number"
         return None
 
 
