@@ -85,6 +85,8 @@ class Mutant:
             return "subscripts of einsum in capitals name the same axes"
         if "strict=True" in self.was and self.becomes in (self.was.replace("strict=True", other) for other in STRICT):
             return "what is zipped is of one length; strict says so"
+        if "json.dumps" in self.was and re.sub(r"(ensure_ascii|allow_nan)=None", r"\1=False", self.becomes) == self.was:
+            return "None is no for json, as False is"
         if self.becomes == self.was.replace('float("nan")', 'float("NAN")') != self.was:
             return "no number in capitals is no number"
         return None

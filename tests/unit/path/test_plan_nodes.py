@@ -113,6 +113,9 @@ def test_paths_of_several_seams_and_why_some_have_none() -> None:
     with pytest.raises(PathError, match=r"^no path along any of 2 seams: seam 1: .* 10 deg .*; seam 2: .* 5 deg ") as caught:
         plan_paths((bad, worse), PathConfig(**AS_FOUND))
     assert caught.value.data == {"s": pytest.approx(0.03)}
+    with pytest.raises(PathError, match=r"^no path along any of 2 seams: seam 1: trims .*; seam 2: .* 5 deg ") as caught:
+        plan_paths((line(0.0, 0.0015), worse), PathConfig(**AS_FOUND))
+    assert caught.value.data["length"] == pytest.approx(0.0015), "what is told is the first's"
 
 
 def test_the_turn_limit_holds_with_its_margin_and_no_more() -> None:
