@@ -41,7 +41,7 @@ def test_what_is_told_of_long_ways_is_in_millimetres() -> None:
         ready(Puppet(), steps=0).check(plan)
 
 
-def test_what_is_just_at_its_limit_is_no_breach() -> None:
+def test_a_value_equal_to_its_limit_is_no_breach() -> None:
     limits = GateConfig()
     puppet = Puppet()
     gate = ready(puppet, Segment.AIR)
