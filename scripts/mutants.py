@@ -43,7 +43,10 @@ GROUPS: dict[str, tuple[list[str], list[str]]] = {
         [f"report/{name}" for name in ("limits", "metrics", "tracking", "view", "weld")],
         ["unit/report", "unit/path/test_ring.py", "property/test_metrics.py"],
     ),
-    "records": (["records/*"], ["unit/test_records.py", "unit/test_inputs.py", "unit/cloud/test_camera_files.py"]),
+    "records": (
+        ["records/*"],
+        ["unit/test_records.py", "unit/test_inputs.py", "unit/test_lens.py", "unit/cloud/test_camera_files.py"],
+    ),
     "frames": (
         ["frames"],
         ["property/test_frames.py", "conventions/test_frames.py", "conventions/test_rotations.py", "unit/test_frames.py"],
