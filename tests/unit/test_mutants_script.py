@@ -52,6 +52,10 @@ def test_faults_in_words_alone_are_told_from_others(mutants: ModuleType, was: st
         ("zip(a, b, strict=True)", "zip(a, b, strict=False)", True),
         ("zip(a, b, strict=True)", "zip(a, b, )", True),
         ("zip(a, b, strict=True)", "zip(a, None, strict=True)", False),
+        ('f(float("nan"), "a")', 'f(float("NAN"), "a")', True),
+        ("json.dumps(a, allow_nan=False, indent=2)", "json.dumps(a, allow_nan=None, indent=2)", True),
+        ("json.dumps(a, allow_nan=False, indent=2)", "json.dumps(a, allow_nan=True, indent=2)", False),
+        ('f(float("nan"), "a")', 'f(float("nan"), "A")', False),
     ],
 )
 def test_faults_that_change_nothing_have_a_reason(mutants: ModuleType, was: str, becomes: str, harmless: bool) -> None:

@@ -102,6 +102,14 @@ def test_an_exact_reversal_becomes_half_a_turn_at_the_limits_rate(axis: int, sig
     assert (turn(found) <= rate * np.diff(s) + 1e-9).all()
 
 
+def test_a_reversal_of_a_slanting_direction_leads_by_the_axis_nearest_to_square() -> None:
+    """(2, 3, 6) / 7 is most square to x: what is left of x beside it is (45, -6, -12) / 49, of length sqrt(45) / 7."""
+    a = np.array([2.0, 3.0, 6.0]) / 7
+    found = limited(np.linspace(0.0, 0.2, 201), np.where(np.arange(201)[:, None] < 100, a, -a), 40.0)
+    middle = found[np.abs(found @ a).argmin()]  # a step turns by 0.04 rad: within half of that of square
+    np.testing.assert_allclose(middle - (middle @ a) * a, np.array([45.0, -6.0, -12.0]) / (7 * np.sqrt(45)), atol=0.02**2)
+
+
 def test_opposite_directions_at_one_place_and_near_opposite_ones_stay_directions() -> None:
     s = np.array([0.0, 0.001, 0.001, 0.002])
     z = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 0.0, -1.0]])

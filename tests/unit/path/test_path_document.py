@@ -2,6 +2,7 @@
 
 import copy
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,33 @@ def test_text_has_a_pose_a_line_and_says_the_same() -> None:
             path_text(changed(place, float("nan")))
 
 
+def test_text_of_several_seams_is_read_back_and_holds_each_pose_once() -> None:
+    two = path_document((seam(), seam()), (path(), path()), {}, {}, "abc")
+    text = path_text(two)
+    assert json.loads(text) == two
+    assert text.count('"poses":') == 2
+    assert text.count('"position":') == 6
+
+
+def test_nought_has_no_sign(tmp_path: Path) -> None:
+    """Less than half a nanometre is rounded to nought, whose sign differs between machines."""
+    moved = replace(path(), X_BT=Transform("BT", path().X_BT.R, path().X_BT.p - np.array([4e-10, 0.0, 0.1])))
+    made = path_document((seam(),), (moved,), {}, {}, "abc")
+    assert made["seams"][0]["poses"][0]["position"] == [0.0, -0.5, 0.0]
+    assert "-0.0" not in path_text(made)
+    made["seams"][0]["poses"][0]["position"][0] = -4e-10
+    row = write_path_csv(tmp_path / "p.csv", made).read_text().splitlines()[3]
+    assert row.startswith("seam-1,0.000000000,0.000000000,-0.500000000,0.000000000,")
+
+
+def test_whole_numbers_in_a_file_are_metres_too() -> None:
+    whole = changed("seams.0.poses", [{"s": i, "position": [i, 0, 0], "quaternion_wxyz": [1, 0, 0, 0]} for i in (0, 1)])
+    check_document(whole)
+    (torch,) = torch_paths(whole)
+    assert {values.dtype for values in (torch.s, torch.X_BT.p, torch.X_BT.R)} == {np.dtype(float)}
+    np.testing.assert_array_equal(torch.X_BT.p, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+
+
 def test_what_is_read_back_is_a_weld_at_the_seams_speed(tmp_path: Path) -> None:
     file = tmp_path / "p.json"
     file.write_text("\ufeff" + path_text(document()), encoding="utf-8")
@@ -160,9 +188,9 @@ def changed(place: str, value: Any) -> dict[str, Any]:
     return made
 
 
-def poses(*s: float) -> list[dict[str, Any]]:
-    """Poses a millimetre apart, at some arc lengths [m]."""
-    return [{"s": at, "position": [0.001 * i, 0.0, 0.0], "quaternion_wxyz": [1.0, 0.0, 0.0, 0.0]} for i, at in enumerate(s)]
+def poses(*s: float, apart: float = 0.001, y: float = 0.0) -> list[dict[str, Any]]:
+    """Poses along x, a millimetre or more apart, at some arc lengths [m]."""
+    return [{"s": at, "position": [apart * i, y, 0.0], "quaternion_wxyz": [1.0, 0.0, 0.0, 0.0]} for i, at in enumerate(s)]
 
 
 WRONG = [
@@ -184,6 +212,7 @@ WRONG = [
     ("seams.0.sigma", [[0.0]], r"sigma: must be a list of numbers"),
     ("seams.0.sigma", [0.0, float("nan")], r"sigma: 1 values are not finite"),
     ("seams.0.sigma", 0.1, r"sigma: must be a list of numbers"),
+    ("seams.0.sigma", ["little"], r"sigma: must be a list of numbers"),
     ("seams.0.gaps", [0.1, 0.2], r"gaps: must be a list of 2 numbers each"),
     ("seams.0.gaps", [[0.1, 0.2], [0.3]], r"gaps: must be a list of 2 numbers each"),
     ("seams.0.poses", {}, "poses is no list of objects"),
@@ -219,6 +248,8 @@ def test_what_is_wrong_is_named_with_its_place(place: str, value: Any, told: str
         ("seams.0.poses", poses(0.0, 0.0, 0.002)),
         ("seams.0.poses", poses(1.0, 1.0019)),
         ("seams.0.poses", poses(0.0, 0.00051)),
+        *(("seams.0.poses", poses(0.0, told, apart=2.0**-4)) for told in (2.0**-3, 2.0**-5)),  # twice and half the way exactly
+        ("seams.0.poses", poses(0.0, 0.001, y=7.0)),  # far away, as of a robot on a gantry
     ],
 )
 def test_what_is_at_its_limit_or_left_out_is_well(place: str, value: Any) -> None:
@@ -232,7 +263,11 @@ def test_what_is_no_document_is_said_so() -> None:
 
 def test_what_cannot_be_read_is_told_with_its_file(tmp_path: Path) -> None:
     file = tmp_path / "p.json"
-    for text, told in ((None, "cannot be read"), ("{", "is no JSON"), ("[" * 100_000, "is no JSON")):
+    for text, told in (
+        (None, r"p\.json: cannot be read \(No such file or directory\)$"),
+        ("{", "is no JSON"),
+        ("[" * 100_000, "is no JSON"),
+    ):
         if text is not None:
             file.write_text(text)
         with pytest.raises(InputError, match=told) as caught:

@@ -75,15 +75,17 @@ def test_two_millimetres_are_worth_a_path() -> None:
     assert caught.value.data == {"length": pytest.approx(0.02), "limit": 0.002}
     with pytest.raises(PathError, match=r"^trims of 0 and 19 mm leave"):
         plan_path(seam, PathConfig(end_trim=0.019))
+    with pytest.raises(PathError, match=r"^trims of 0 and 0 mm leave 1\.9 mm of a seam 1\.9 mm long"):
+        plan_path(line(0.0, 0.0019495), PathConfig())
     with pytest.raises(PathError, match=r"leave 0\.0 mm"):
         plan_path(seam, PathConfig(start_trim=0.01, end_trim=0.012))
 
 
-def steep(angle: float) -> Seam:
-    """The wire stands square to travel but for the last point, where it is `angle` [rad] from it."""
+def steep(angle: float, apart: float = 0.01) -> Seam:
+    """The wire stands square to travel but for the last of four points, where it is `angle` [rad] from it."""
     normals = np.tile([0.0, 0.0, 1.0], (4, 1))
     normals[-1] = [-np.cos(angle), 0.0, np.sin(angle)]
-    x = np.array([0.0, 0.01, 0.02, 0.03])
+    x = apart * np.arange(4)
     return Seam(
         points_B=np.stack([x, np.full(4, -0.5), np.zeros(4)], axis=1),
         s=x,
@@ -98,6 +100,8 @@ def test_a_wire_nearer_than_20_degrees_to_travel_has_no_side() -> None:
     with pytest.raises(PathError, match=r"normal lies 19 deg from its travel at s = 30\.0 mm \(least 20 deg\)") as caught:
         plan_path(steep(np.radians(19.4)), PathConfig(**AS_FOUND))
     assert caught.value.data == {"s": pytest.approx(0.03)}
+    with pytest.raises(PathError, match=r"at s = 450\.0 mm \("):
+        plan_path(steep(np.radians(19.4), apart=0.15), PathConfig(**AS_FOUND))
 
 
 def test_paths_of_several_seams_and_why_some_have_none() -> None:
@@ -113,6 +117,9 @@ def test_paths_of_several_seams_and_why_some_have_none() -> None:
     with pytest.raises(PathError, match=r"^no path along any of 2 seams: seam 1: .* 10 deg .*; seam 2: .* 5 deg ") as caught:
         plan_paths((bad, worse), PathConfig(**AS_FOUND))
     assert caught.value.data == {"s": pytest.approx(0.03)}
+    with pytest.raises(PathError, match=r"^no path along any of 2 seams: seam 1: trims .*; seam 2: .* 5 deg ") as caught:
+        plan_paths((line(0.0, 0.0005, 0.0015), worse), PathConfig(**AS_FOUND))
+    assert caught.value.data["length"] == pytest.approx(0.0015), "what is told is the first's"
 
 
 def test_the_turn_limit_holds_with_its_margin_and_no_more() -> None:

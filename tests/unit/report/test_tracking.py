@@ -38,15 +38,16 @@ def along_x(x: np.ndarray) -> np.ndarray:
 
 
 def test_tips_are_averaged_over_half_millimetres_and_the_ends_stand_for_themselves() -> None:
-    s = 0.13e-3 * np.arange(17)  # 4, 4, 4, 4 and 1 in each half millimetre
+    s = 0.13e-3 * np.arange(19)  # 4, 4, 4, 4 and 3 in each half millimetre
     x = 0.2 + s
-    y = 1e-5 * (-1.0) ** np.arange(17)  # noise that averages out
-    tip, wire = thinned(log_of(np.stack([x, y, 0 * x], axis=1), s, lean=0.1 * (-1.0) ** np.arange(17)))
-    groups = [np.arange(17)[k : k + 4] for k in (0, 4, 8, 12, 16)]
+    y = 1e-5 * (-1.0) ** np.arange(19)  # noise that averages out
+    tip, wire = thinned(log_of(np.stack([x, y, 0 * x], axis=1), s, lean=0.1 * (-1.0) ** np.arange(19)))
+    groups = [np.arange(19)[k : k + 4] for k in (0, 4, 8, 12, 16)]
     wanted = np.array([[x[g].mean(), y[g].mean(), 0.0] for g in groups])
-    wanted[0], wanted[-1] = [x[0], y[0], 0.0], [x[16], y[16], 0.0]
+    wanted[0], wanted[-1] = [x[0], y[0], 0.0], [x[18], y[18], 0.0]
     np.testing.assert_allclose(tip, wanted, atol=1e-15)
     assert tip[0, 0] == 0.2, "an average would begin 0.195 mm later"
+    assert tip[-1, 0] == 0.2 + 18 * 0.13e-3, "an average would end 0.13 mm earlier"
     np.testing.assert_allclose(wire[1:4], np.tile([0.0, 0.0, 1.0], (3, 1)), atol=1e-12)
     np.testing.assert_allclose(wire[[0, -1]], np.tile([0.0, -np.sin(0.1), np.cos(0.1)], (2, 1)), atol=1e-12)
 

@@ -1,5 +1,6 @@
 """Each end of a groove is where it was made, on exact clouds of grooves whose two ends differ."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -12,7 +13,11 @@ from weldsim.pipeline import look
 from weldsim.records import PointCloud
 from weldsim.report.metrics import known_offsets
 from weldsim.seam.config import ProfileConfig
-from weldsim.seam.profile.find import find_seams_profile
+from weldsim.seam.profile.atlas import make_atlas
+from weldsim.seam.profile.ends import seam_span
+from weldsim.seam.profile.find import _search, find_seams_profile
+from weldsim.seam.profile.parent import CELL
+from weldsim.seam.profile.refine import Fit
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.track import _meets_other
 
@@ -153,3 +158,54 @@ def test_an_end_aslant_as_a_depth_camera_sees_it(radius: int, width: int, depth:
     assert np.percentile(off, 95) < 1e-3
     assert seam.sigma is not None
     assert (off < 2 * seam.sigma[last]).mean() > 0.9
+
+
+@pytest.fixture(scope="module")
+def measured() -> Fit:
+    """A groove 120 mm long, whose plates and depth the tests below write by hand."""
+    x, y = np.meshgrid(np.arange(-0.06, 0.06, SPACING), np.arange(-0.06, 0.06, SPACING))
+    below = DEPTH * np.maximum(1 - np.abs(y) / (WIDTH / 2), 0.0)
+    points = np.stack([x, y - 0.5, -below], axis=-1).reshape(-1, 3)
+    atlas = make_atlas(PointCloud(points=points, viewpoints=np.array([[0.0, -0.5, 0.45]])))
+    ((only,), _) = _search(atlas, atlas.coarse_lines(ProfileConfig(), 1.0)[0], ProfileConfig())
+    return only.fit
+
+
+def by_hand(
+    fit: Fit, seen: slice, left: tuple[float, float], right: tuple[float, float], beside: float, spread: float = 0.0
+) -> Fit:
+    """The groove of amplitude 1 at some stations and `beside` elsewhere, and plates between two arc lengths [m] on its sides."""
+    m = len(fit.rail)
+    cells = [
+        (s, side * (fit.inner + k * CELL))
+        for side, (low, high) in ((1, left), (-1, right))
+        for k in range(1, 6)
+        for s in np.linspace(low, high, round((high - low) / CELL) + 1)
+    ]
+    weight, amplitude = np.zeros(m), np.full(m, beside)
+    weight[seen] = amplitude[seen] = 1.0
+    track = replace(fit.track, weight=weight, amplitude=amplitude, usual=1.0, spread=spread, alike=1.0, run_out=0.0)
+    return replace(fit, parent=replace(fit.parent, cells=np.array(cells), support=np.ones((m, 2))), track=track)
+
+
+@pytest.mark.parametrize("left_is_shorter", [False, True])
+def test_a_groove_of_two_plates_begins_with_the_second_and_ends_with_the_first(measured: Fit, left_is_shorter: bool) -> None:
+    """A cell reaches half its side beyond its middle."""
+    step = measured.rail.step
+    seen = slice(round(0.040 / step), round(0.070 / step) + 1)
+    plates = ((0.022, 0.090), (0.038, 0.072)) if left_is_shorter else ((0.038, 0.090), (0.022, 0.072))
+    span = seam_span(by_hand(measured, seen, *plates, beside=np.nan), ProfileConfig())
+    np.testing.assert_allclose(span, [0.038 - CELL / 2, 0.072 + CELL / 2], atol=1e-9)
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_noise_hides_an_end_up_to_the_plates_edge_and_a_clear_end_is_where_the_depth_halves(measured: Fit, hidden: bool) -> None:
+    """From 1 to 0.2 of the depth in one station, half of it is left after 5 / 8 of the way. With noise of 1 in the depth,
+    9 stations of 0.2 on the way to the edge speak against a groove by 9 (1 - 2 * 0.2) / 2 = 2.7 alone (limit 3)."""
+    step = measured.rail.step
+    seen = slice(round(0.040 / step), round(0.070 / step) + 1)
+    plate = (0.034, 0.078)
+    fit = by_hand(measured, seen, plate, plate, beside=0.2, spread=1.0 if hidden else 0.01)
+    clear = [seen.start * step - 0.625 * step, (seen.stop - 1) * step + 0.625 * step]
+    wanted = [0.034 - CELL / 2, 0.078 + CELL / 2] if hidden else clear
+    np.testing.assert_allclose(seam_span(fit, ProfileConfig()), wanted, atol=1e-9)

@@ -14,7 +14,7 @@ from weldsim.seam.profile.blocks import mean_blocks
 from weldsim.seam.profile.grid import Grid, make_grid
 from weldsim.seam.profile.lean import CERTAIN, Doubt, first_section, follow_section, settled_section
 from weldsim.seam.profile.parent import Parent, fit_parent
-from weldsim.seam.profile.rail import Rail, lay_out, make_rail, shift_rail
+from weldsim.seam.profile.rail import Rail, Strip, lay_out, make_rail, shift_rail
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
 from weldsim.seam.profile.strength import Choice
@@ -36,6 +36,27 @@ NEAR_RAIL = 0.008  # [m] above and below a rail that lies on the parent surface;
 FIRST_LOOK = 12_000  # points enough to refuse what is no groove
 
 Stage = Literal["first", "following", "settled"]  # how far a section is looked for
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """The points near a groove.
+
+    Attributes:
+        points: (n, 3) [m].  origins: (n, 3) where the camera that saw each stood, or None.
+    """
+
+    points: Float[ndarray, "n 3"]
+    origins: Float[ndarray, "n 3"] | None
+
+    def thinned(self, most: int) -> "Surroundings":
+        """Every so many of them, `most` to twice as many; all where they are fewer."""
+        stride = max(1, len(self.points) // most)
+        return Surroundings(self.points[::stride], None if self.origins is None else self.origins[::stride])
+
+    def along(self, rail: Rail) -> Strip:
+        """Each point in a rail's coordinates."""
+        return lay_out(rail, self.points, self.origins)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +108,15 @@ def refine(
         return None
     rail = make_rail(even, np.repeat(normal[None], len(even), 0), config.station_step, EXTEND)
     inner, outer = 0.5 * config.max_width, 0.5 * config.max_width + config.side_band
-    every, every_origin = points, origins
-    stride = max(1, len(points) // FIRST_LOOK)
-    points, origins = points[::stride], None if origins is None else origins[::stride]
-    strip = lay_out(rail, points, origins)
+    around = Surroundings(points, origins)
+    few = around.thinned(FIRST_LOOK)
+    strip = few.along(rail)
     parent = fit_parent(rail, strip, inner, outer)
     # Sides are at an angle, too, that are bent and seen from a slant; that is told when the rail stands upright.
     if np.count_nonzero(sided(parent, config, most=STEEP)) * rail.step < 0.7 * config.min_length:
         return None
     rail = shift_rail(rail, np.zeros(len(rail)), parent.a, parent.b)
-    strip = lay_out(rail, points, origins)
+    strip = few.along(rail)
     parent = fit_parent(rail, strip, inner, outer)
     if np.count_nonzero(sided(parent, config)) * rail.step < 0.7 * config.min_length:
         return None
@@ -105,7 +125,7 @@ def refine(
         return None
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
-    return _settled(_measure(rail, section, every, every_origin, config, "first"), every, every_origin, config, BRIDGE)
+    return _settled(_measure(rail, section, around, config, "first"), around, config, BRIDGE)
 
 
 def resume(
@@ -124,23 +144,18 @@ def resume(
         points, origins: as in `refine`.  bridge: longest stretch without a groove that does not end it [m].
     """
     rail = make_rail(line, normals, config.station_step, EXTEND)
-    return _settled(_measure(rail, section, points, origins, config), points, origins, config, bridge)
+    around = Surroundings(points, origins)
+    return _settled(_measure(rail, section, around, config), around, config, bridge)
 
 
-def _settled(
-    measured: "Measurement | None",
-    points: Float[ndarray, "n 3"],
-    origins: Float[ndarray, "n 3"] | None,
-    config: ProfileConfig,
-    bridge: float,
-) -> Fit | None:
+def _settled(measured: "Measurement | None", around: Surroundings, config: ProfileConfig, bridge: float) -> Fit | None:
     """The fit once the rail has come to rest, and no groove is seen farther ahead."""
     last: Measurement | None = None
     for _ in range(MOST_LOOKS):
-        before = _at_rest(measured, points, origins, config, bridge)
+        before = _at_rest(measured, around, config, bridge)
         if before is None:
             return None
-        measured = last = _farther(before, points, origins, config, bridge)
+        measured = last = _farther(before, around, config, bridge)
         if measured is None:
             return _concluded(before, bridge)
         if measured.reach(bridge) <= before.reach(bridge) + FEWEST_STATIONS:
@@ -148,38 +163,26 @@ def _settled(
     for _ in range(MOST_LOOKS - 1):
         if last is None or not last.goes_on(bridge, 0.3 * LOOK_AHEAD):
             break
-        measured = _farther(last, points, origins, config, bridge)
+        measured = _farther(last, around, config, bridge)
         if measured is None:
             break
         last = measured
     return None if last is None else _concluded(last, bridge)
 
 
-def _farther(
-    measured: "Measurement",
-    points: Float[ndarray, "n 3"],
-    origins: Float[ndarray, "n 3"] | None,
-    config: ProfileConfig,
-    bridge: float,
-) -> "Measurement | None":
+def _farther(measured: "Measurement", around: Surroundings, config: ProfileConfig, bridge: float) -> "Measurement | None":
     """The last, most careful measurement, along a rail that looks ahead at both ends; None where hardly any groove is seen."""
-    return _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, points, origins, config, "settled")
+    return _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, around, config, "settled")
 
 
-def _at_rest(
-    measured: "Measurement | None",
-    points: Float[ndarray, "n 3"],
-    origins: Float[ndarray, "n 3"] | None,
-    config: ProfileConfig,
-    bridge: float,
-) -> "Measurement | None":
+def _at_rest(measured: "Measurement | None", around: Surroundings, config: ProfileConfig, bridge: float) -> "Measurement | None":
     """The measurement after as many turns as the rail needs to come to rest and to stop growing; None where it is lost."""
     for _ in range(MOST_TURNS - 1):
         if measured is None:
             return None
         before = measured
         extend = LOOK_AHEAD if before.goes_on(bridge) else EXTEND
-        measured = _measure(_next_rail(before, bridge, extend), before.section, points, origins, config)
+        measured = _measure(_next_rail(before, bridge, extend), before.section, around, config)
         if measured is not None and measured.settled and measured.reach(bridge) <= before.reach(bridge) + 2:
             break
     return measured
@@ -232,15 +235,10 @@ class Measurement:
 
 
 def _measure(
-    rail: Rail,
-    start: Section,
-    points: Float[ndarray, "n 3"],
-    origins: Float[ndarray, "n 3"] | None,
-    config: ProfileConfig,
-    stage: Stage = "following",
+    rail: Rail, start: Section, around: Surroundings, config: ProfileConfig, stage: Stage = "following"
 ) -> Measurement | None:
     """Parent surface, section and track along a rail, or None where hardly any groove is seen."""
-    strip = lay_out(rail, points, origins)
+    strip = around.along(rail)
     blur = start.blur * WIDEST_FOOTPRINT
     inner = 0.5 * start.width + 0.7 * blur + 0.001
     parent = fit_parent(rail, strip, inner, inner + config.side_band, NEAR_RAIL)
