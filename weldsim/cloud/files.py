@@ -21,6 +21,7 @@ from weldsim.cloud.pcd import read_pcd
 from weldsim.cloud.ply import read_ply
 from weldsim.cloud.ptx import is_ptx, read_ptx
 from weldsim.cloud.raw import RawCloud, Unreadable
+from weldsim.cloud.sensor_frame import placed
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
 from weldsim.columns import decode
@@ -48,7 +49,8 @@ def read_cloud(
     those at 0 0 0 where several are.
 
     Args:
-        path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, told apart by content.
+        path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, told apart by content. Points in the frame of a sensor whose pose the file
+            gives are moved by it; the cloud's `notes` say so.
         unit: the file's unit of length; by default the one that its columns' names give, else metres.
         viewpoint: where the camera stood (3,) [m] in the same frame; it outranks what the file says.
         crop: lower and upper corner of the box that is kept [m]; by default everything is.
@@ -56,12 +58,12 @@ def read_cloud(
         CloudFileError: missing, unreadable, cut off, or no cloud.
         CloudError: no finite point, coordinates too coarse, an extent that shows that `unit` is wrong, or a camera too far away.
     """
-    data = read_bytes(path)
+    data, given = read_bytes(path), _given(viewpoint)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):  # UTF-16, as spreadsheets save text
         data = decode(data).encode()
     try:
         with np.errstate(all="ignore"):  # signalling NaNs and the like are dropped below
-            raw = _reader(data)(data)
+            raw = placed(_reader(data)(data), given)
     except Unreadable as error:
         raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
     said = unit or raw.unit or "m"
@@ -81,14 +83,15 @@ def read_cloud(
         whole = bool(keep.all())
         points = (raw.points if whole else raw.points[keep]) * scale
         check_extent(str(path), points, said, dropped, raw)
-    viewpoints, view = _viewpoints(raw, scale, viewpoint)
-    check_viewpoints(str(path), points, viewpoints, option=viewpoint is not None)
+    viewpoints, view = _viewpoints(raw, scale, given)
+    check_viewpoints(str(path), points, viewpoints, option=given is not None)
     return PointCloud(
         points=points,
         normals=_unit_normals(raw.normals, keep),
         colours=None if raw.colours is None else raw.colours if whole else raw.colours[keep],
         viewpoints=viewpoints,
         view=None if view is None else view[keep],
+        notes=raw.notes,
     )
 
 
@@ -140,14 +143,19 @@ def _unit_normals(normals: Float[ndarray, "n 3"] | None, keep: Bool[ndarray, "n"
         return kept / np.sqrt(squares)[:, None]
 
 
-def _viewpoints(
-    raw: RawCloud, scale: float, viewpoint: Sequence[float] | ndarray | None
-) -> tuple[Float[ndarray, "k 3"], ndarray | None]:
+def _given(viewpoint: Sequence[float] | ndarray | None) -> Float[ndarray, "3"] | None:
+    """Where the caller says that the camera stood [m]. Raises CloudError for what is no place."""
+    if viewpoint is None:
+        return None
+    given = np.asarray(viewpoint, float).reshape(-1)
+    if given.shape != (3,) or not np.isfinite(given).all():
+        raise CloudError(f"viewpoint {viewpoint!r}: three finite numbers in metres are needed", viewpoint=viewpoint)
+    return given
+
+
+def _viewpoints(raw: RawCloud, scale: float, given: Float[ndarray, "3"] | None) -> tuple[Float[ndarray, "k 3"], ndarray | None]:
     """Camera positions [m] and which of them saw each point, or none known."""
-    if viewpoint is not None:
-        given = np.asarray(viewpoint, float).reshape(-1)
-        if given.shape != (3,) or not np.isfinite(given).all():
-            raise CloudError(f"viewpoint {viewpoint!r}: three finite numbers in metres are needed", viewpoint=viewpoint)
+    if given is not None:
         return given[None], None
     found = raw.viewpoints
     if found is None or not np.isfinite(found).all() or len(found) == 0:

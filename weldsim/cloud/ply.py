@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.cloud.raw import RawCloud, Unreadable, check_count, from_columns
+from weldsim.cloud.sensor_frame import rotation_of_matrix
 from weldsim.cloud.table import parse_table
 
 _TYPES = {
@@ -21,6 +22,7 @@ _TYPES = {
 _MAX_HEADER = 65_536
 _VERTICES = ("vertex", "vertices", "point", "points")
 _VIEW = ("view_px", "view_py", "view_pz")
+_ROWS = tuple(tuple(f"{row}_axis{axis}" for axis in "xyz") for row in "xyz")  # of PCL's rotation matrix, whatever their names say
 
 
 @dataclass
@@ -66,17 +68,22 @@ def read_ply(data: bytes) -> RawCloud:
         data = data.replace(b"\r", b"\n")
     read = _ascii_columns if order == "ascii" else _binary_columns
     columns = read(data, start, before, vertex, order)
+    R = None
     if viewpoints is None and elements[at + 1 :] and elements[at + 1].name == "camera" and not elements[at + 1].has_list:
-        viewpoints = _camera(read(data, start, [*before, vertex], elements[at + 1], order))
-    return from_columns(columns, viewpoints=viewpoints)
+        viewpoints, R = _camera(read(data, start, [*before, vertex], elements[at + 1], order))
+    return from_columns(columns, viewpoints=viewpoints, rotation=R)
 
 
-def _camera(columns: dict[str, ndarray]) -> Float[ndarray, "1 3"] | None:
-    """Where the camera stood, as PCL writes it after the points; its default, the origin, says nothing."""
+def _camera(columns: dict[str, ndarray]) -> tuple[Float[ndarray, "1 3"] | None, Float[ndarray, "3 3"] | None]:
+    """Position and rotation of the camera, as PCL writes them after the points; its default, the identity, says nothing."""
     if not all(name in columns and len(columns[name]) == 1 for name in _VIEW):
-        return None
+        return None, None
     place = np.array([[float(columns[name][0]) for name in _VIEW]])
-    return place if np.isfinite(place).all() and place.any() else None
+    if not np.isfinite(place).all():
+        return None, None
+    rows = np.array([[float(columns[name][0]) if name in columns else np.nan for name in names] for names in _ROWS])
+    R = rotation_of_matrix(rows)
+    return (None, None) if R is None and not place.any() else (place, R)
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | None, int]:
