@@ -24,7 +24,7 @@ from weldsim.cloud.raw import RawCloud, Unreadable
 from weldsim.cloud.sensor_frame import placed
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
-from weldsim.columns import decode
+from weldsim.columns import decode, utf_16
 from weldsim.errors import CloudError, CloudFileError, OutputError
 from weldsim.output import write_whole
 from weldsim.records import PointCloud
@@ -32,7 +32,12 @@ from weldsim.records import PointCloud
 __all__ = ["LengthUnit", "check_plannable", "read_cloud", "read_depth_frame", "write_cloud", "write_depth_png"]
 
 LengthUnit = Literal["m", "cm", "mm", "in"]
-_OTHERS = {b"LASF": "a LAS or LAZ file", b"ASTM-E57": "an E57 file", b"solid ": "an STL mesh", b"OFF": "an OFF mesh"}
+_OTHERS = {
+    b"LASF": "a LAS or LAZ file", b"ASTM-E57": "an E57 file", b"solid ": "an STL mesh", b"OFF": "an OFF mesh",
+    b"glTF": "a glTF mesh", b"\x89HDF": "an HDF5 file, as Zivid's ZDF and MATLAB's are", b"MATLAB 5.0": "a MATLAB file",
+    b"#ROSBAG": "a ROS bag", b"\xff\xd8\xff": "a JPEG image", b"II*\0": "a TIFF image", b"MM\0*": "a TIFF image",
+    b"<!DOCTYPE": "a web page", b"<html": "a web page", b"<?xml": "an XML file", b"%PDF": "a PDF",
+}  # fmt: skip
 MIN_POINTS = 100  # fewer cannot show a groove
 SAMPLE = 20_000  # points tell the breadth of a cloud that is no line
 MIN_BREADTH = 0.001  # [m] rms breadth across the longest direction below which the points are a line
@@ -59,7 +64,7 @@ def read_cloud(
         CloudError: no finite point, coordinates too coarse, an extent that shows that `unit` is wrong, or a camera too far away.
     """
     data, given = read_bytes(path), _given(viewpoint)
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):  # UTF-16, as spreadsheets save text
+    if utf_16(data) is not None:  # as spreadsheets save text
         data = decode(data).encode()
     try:
         with np.errstate(all="ignore"):  # signalling NaNs and the like are dropped below
@@ -68,7 +73,7 @@ def read_cloud(
         raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
     said = unit or raw.unit or "m"
     if raw.unit is not None and said != raw.unit:
-        raise CloudError(f"{path}: --units {said}, but its columns are named in {raw.unit}; leave --units out", path=str(path))
+        raise CloudError(f"{path}: --units {said}, but its header says {raw.unit}; leave --units out", path=str(path))
     scale = METRES[said]
     keep = _seen(raw.points)
     total, dropped = len(keep), int((~keep).sum())
@@ -99,12 +104,16 @@ def _reader(data: bytes) -> Callable[[bytes], RawCloud]:
     """What reads `data`, from its first bytes."""
     if data[:3] == b"ply" and data[3:4] in (b"\n", b"\r", b" "):
         return read_ply
-    if data[:2] == b"PK" or data[:6] == b"\x93NUMPY":
-        return read_array_cloud
     if data[:4] == b"\x89PNG":
         raise Unreadable("it is a PNG image; a depth image needs its intrinsics beside it (--intrinsics)")
     if data[:2] == b"\x1f\x8b":
         raise Unreadable("it is gzip-compressed; unpack it first")
+    if data.startswith(b"version https://git-lfs"):
+        raise Unreadable("it is a pointer of Git LFS, not the file itself: git lfs pull fetches it")
+    if data[:2] == b"PK" and b"[Content_Types].xml" in data[:4096]:
+        raise Unreadable("it is an Excel workbook; save the sheet as CSV")
+    if data[:2] == b"PK" or data[:6] == b"\x93NUMPY":
+        return read_array_cloud
     for magic, name in _OTHERS.items():
         if data.startswith(magic):
             raise Unreadable(f"it is {name}; export the cloud as PLY, PCD or XYZ text")

@@ -7,7 +7,20 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.columns import AXES, NORMALS, UNITS, ColumnName, TextTable, by_role, counts, decode, find_table, is_comment, is_number
+from weldsim.columns import (
+    AXES,
+    NORMALS,
+    UNITS,
+    ColumnName,
+    TextTable,
+    by_role,
+    counts,
+    decode,
+    find_table,
+    is_comment,
+    is_number,
+    without_thousands,
+)
 from weldsim.errors import SceneError
 
 COLUMNS = (*AXES, *NORMALS, "width")
@@ -85,7 +98,7 @@ def _lines(path: Path) -> list[str]:
     text = decode(data)
     if "\0" in text:
         raise SceneError(f"mesh.seam {path}: is no text", path=str(path), key="seam")
-    lines = text.split("\n")
+    lines = without_thousands(text).split("\n")
     if len(lines) > MOST:
         raise SceneError(f"mesh.seam {path}: {len(lines)} lines; at most {MOST} are read", path=str(path), limit=MOST)
     return lines
