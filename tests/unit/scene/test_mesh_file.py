@@ -270,7 +270,7 @@ def test_gaps_up_to_a_thousandth_of_the_part_are_stitched_and_told_and_wider_one
             gap = float(note.partition("gaps of up to ")[2].split()[0])
             assert 0.3 * width < gap < 4 * width
     apart = CORNERS[FACES].reshape(-1, 3) + rng.uniform(-2.0, 2.0, (72, 3))
-    with pytest.raises(SceneError, match=r"72 have one face only.*fill holes"):
+    with pytest.raises(SceneError, match=r"72 have one face only.*export it as a solid"):
         read_mesh_file(stl(tmp_path / "a.stl", apart, np.arange(72).reshape(-1, 3)))
 
 
@@ -283,3 +283,9 @@ def test_a_hole_with_a_fine_border_is_not_stitched(tmp_path: Path) -> None:
     fine[np.linalg.norm(fine - [0, 0, 100], axis=1) < 12.0, :2] *= 0.03  # edges shorter than gaps that are stitched, along a hole
     with pytest.raises(SceneError, match="have one face only"):
         read_mesh_file(stl(tmp_path / "a.stl", fine, np.array(ball.faces)[kept]))
+
+
+def test_a_surface_without_thickness_is_called_that(tmp_path: Path) -> None:
+    path = stl(tmp_path / "a.stl", CORNERS, FACES[:6])
+    with pytest.raises(SceneError, match="a surface without thickness is no part: export it as a solid"):
+        read_mesh_file(path)
