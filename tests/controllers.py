@@ -12,7 +12,7 @@ from functools import cache
 from tests.arm_worlds import bare_model
 from weldsim.controller.arm import Arm
 from weldsim.controller.config import ControllerConfig
-from weldsim.controller.functions import builtins
+from weldsim.controller.functions import builtins, elsewhere
 from weldsim.controller.machine import Machine
 from weldsim.controller.profile import PROFILES, Series
 from weldsim.execution.ur_ports import DASHBOARD, FAULTS, PRIMARY, PRIMARY_READ_ONLY, REALTIME, RTDE, SECONDARY
@@ -28,7 +28,7 @@ def new_machine(series: Series = "cb3", config: ControllerConfig | None = None) 
     """A controller over the bare arm, its arm at HOME."""
     profile = PROFILES[series]
     machine = Machine(profile, Arm(bare_model(), HOME.tolist(), profile), config)
-    machine.provide(builtins(machine))
+    machine.provide(builtins(machine), elsewhere(machine))
     return machine
 
 

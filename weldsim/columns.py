@@ -28,6 +28,13 @@ _NUMBER = re.compile(r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|inf(?:in
 _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _COMMENT = re.compile(r"\s*[\"']?(?:#|//|/\*|%|!|\*|--|REM\b|;(?!\s*[-+.\d]))", re.IGNORECASE)
 _TRAILING = re.compile(r"\s*(?:#|//|%|!).*$")
+_UNIT_SAID = re.compile(r"\bunits?\b(?:\s+(?:of\s+)?lengths?)?(?:\s*[:=\[(]|\s+is\b|\s+in\b)+\s*([A-Za-z]+)", re.IGNORECASE)
+_GROUPED = re.compile(
+    r"(?:(?<=[;\t\"])|^)[ ]*[-+]?(?:(?P<point>\d{1,3}(?:\.\d{3})+,\d+)|(?P<comma>\d{1,3}(?:,\d{3})+\.\d+)"
+    r"|(?P<blank>\d{1,3}(?:[\u00a0\u202f'\u2019]\d{3})+(?:[.,]\d+)?|\d{1,3}(?: \d{3})+[.,]\d+))[ ]*(?=[;\t\"]|$)",
+    re.MULTILINE,
+)
+_MARKS = {"point": re.compile(r"\."), "comma": re.compile(","), "blank": re.compile("[ \u00a0\u202f'\u2019]")}
 _QUOTED = re.compile(r'"([^"\n]*)"')
 _PLACE = "positions?|pos|points?|pts?|p|coordinates?|coords?|koordinaten?|coord|vertex|vertices|locations?|loc"
 _PLACES = re.compile(
@@ -38,6 +45,7 @@ _COLOUR = re.compile("rgba?|colou?rs?|diffuse")
 _JOINED_AXIS = re.compile(f"(?:{_PLACE})?([xyz])(?:{_PLACE})?")
 _JOINED_NORMAL = re.compile("(?:normals?|norm|n)([xyz])")
 _SURVEY = {"easting": "x", "northing": "y", "elevation": "z", "altitude": "z", "height": "z"}
+_TRANSLATION = {"tx": "x", "ty": "y", "tz": "z"}
 _COLOUR_NAMES = {"r": "red", "g": "green", "b": "blue", "rf": "red", "gf": "green", "bf": "blue"}
 _OTHERS = re.compile(
     "id|ids|index|idx|no|nr|number|num|row|intensity|reflectance|reflectivity|amplitude|scalar|label|class|classification|time|"
@@ -90,18 +98,52 @@ class TextTable:
 
 
 def decode(data: bytes) -> str:
-    """The text in `data`: UTF-8, with or without its mark, UTF-16 with its mark, else cp1252, which every byte reads as.
+    """The text in `data`: UTF-8 or UTF-16, with or without its mark, else cp1252, which every byte reads as.
 
     Only comments, titles and names can differ by it: numbers are ASCII. Line ends become newlines.
     """
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff") and len(data) % 2 == 0:
-        text = data.decode("utf-16", errors="replace")
+    if (order := utf_16(data)) is not None:
+        text = data.decode(order, errors="replace")
     else:
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.removeprefix(b"\xef\xbb\xbf").decode("cp1252", errors="replace")
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def utf_16(data: bytes) -> str | None:
+    """The codec of UTF-16 text: by its mark, or because every other one of its first bytes is zero; None of anything else."""
+    if len(data) % 2:
+        return None
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    head = data[:256]
+    for order, zeros, letters in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
+        if len(head) >= 16 and not any(zeros) and all(byte in b"\t\n\r" or 32 <= byte < 127 for byte in letters):
+            return order
+    return None
+
+
+def without_thousands(text: str) -> str:
+    """The text with numbers such as 1.234,567 or 1,234.567 as 1234,567 and 1234.567.
+
+    Only between semicolons, tabs or quotes, where a comma parts no columns, and only where a number has both marks, or groups
+    parted by blanks or apostrophes, so that no other reading is left.
+    """
+
+    def plain(found: re.Match[str]) -> str:
+        around = text[max(found.start() - 1, 0) : found.start()] + text[found.end() : found.end() + 1]
+        return _MARKS[found.lastgroup or ""].sub("", found[0].strip(" ")) if any(mark in around for mark in ';\t"') else found[0]
+
+    return _GROUPED.sub(plain, text)
+
+
+def unit_of_comments(lines: Sequence[str]) -> str | None:
+    """The unit of length that comments give, "units: mm" say; None where none does."""
+    found = (_UNIT_SAID.search(line) for line in lines if is_comment(line))
+    units = {match[1].lower() for match in found if match is not None and match[1].lower() in UNITS}
+    return units.pop() if len(units) == 1 else None
 
 
 def is_comment(line: str) -> bool:
@@ -137,9 +179,11 @@ def find_table(lines: Sequence[str], *, least: int = 3) -> TextTable | None:
         delimiter, numbers = _delimiter(line)
         cells = split(_TRAILING.sub("", line), delimiter)
         row = [is_number(cell) or _is_comma_number(cell, delimiter) for cell in cells]
-        if numbers < least or not (all(row[:least]) or all(row[1 : least + 1])):
+        if numbers < least:
             continue
         names = _names(lines[:first], delimiter, len(cells))
+        if not (all(row[:least]) or all(row[1 : least + 1]) or _has_place(names, row)):
+            continue
         names = None if names is None else _aligned(names, lines[first : first + SAMPLE], delimiter, len(cells))
         if names is None and _counts_columns(cells) and len(lines) > first + 1 and "." in lines[first + 1]:
             continue  # the numbers that pandas gives columns without names
@@ -206,6 +250,8 @@ def _role(words: list[str]) -> str | None:
         return axis[1]
     if one in _SURVEY:
         return _SURVEY[one]
+    if one in _TRANSLATION:
+        return _TRANSLATION[one]
     if placed and one in ("0", "1", "2"):
         return AXES[int(one)]
     if (axis := _JOINED_NORMAL.fullmatch(one)) is not None:
@@ -287,6 +333,17 @@ def _are_units(cells: list[str]) -> bool:
     """Whether cells are a line of units, a length among them."""
     found = [_unit(cell.strip("[]()")) for cell in cells if cell]
     return any(unit in UNITS for unit in found) and all(unit in UNITS or unit in OTHER_UNITS for unit in found)
+
+
+def _has_place(names: tuple[ColumnName, ...] | None, row: Sequence[bool]) -> bool:
+    """Whether columns are named x, y and z, and hold numbers; others may hold names of frames, say."""
+    if names is None or len(names) != len(row):
+        return False
+    try:
+        found = by_role(names)
+    except ValueError:
+        return False
+    return all(row[found[axis]] for axis in AXES)
 
 
 def _aligned(names: tuple[ColumnName, ...], rows: Sequence[str], delimiter: str | None, width: int) -> tuple[ColumnName, ...]:

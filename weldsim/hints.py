@@ -24,6 +24,7 @@ FLATTEST = 0.25  # sine of the angle between sight and surface: flatter, it sees
 STAND_OFF = 0.45  # [m] of the viewpoint that is tried in place of one that cannot be
 AHEAD = 0.8  # cosine to the z axis, along which a camera looks in its own frame, of the way to the middle of its cloud
 FARTHEST = 2.0  # [m] from a camera at the origin to a cloud in its own frame
+OWN_FRAME = "; with --viewpoint 0 0 0 one is: the cloud looks like one in its camera's own frame, and so would be the path"
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,9 @@ def _of_viewpoint(cloud: PointCloud, config: CellConfig) -> str:
         return ""
     plane = _plane(cloud)
     reason = _impossible(stood, cloud, plane)
+    beside = float((stood - plane.middle) @ plane.normal) * float(-plane.middle @ plane.normal) > 0  # the origin's side
+    if (reason is not None or beside) and _is_seen_from_origin(cloud, plane, config):
+        return f"{OWN_FRAME}; --viewpoint is where the camera stood in the frame of the cloud"
     if reason is None:
         return ""
     other = plane.middle + STAND_OFF * plane.normal
@@ -82,16 +86,16 @@ def _impossible(stood: Float[ndarray, "3"], cloud: PointCloud, plane: _Plane) ->
 
 def _of_frame(cloud: PointCloud, config: CellConfig) -> str:
     """Whether the cloud is in the frame of the camera that saw it."""
-    if len(cloud.viewpoints):
-        return ""
+    return OWN_FRAME if not len(cloud.viewpoints) and _is_seen_from_origin(cloud, _plane(cloud), config) else ""
+
+
+def _is_seen_from_origin(cloud: PointCloud, plane: _Plane, config: CellConfig) -> bool:
+    """Whether the cloud lies before a camera at the origin, as in a camera's own frame, and a seam is found from there."""
     nearest = float(np.sqrt(np.einsum("ij,ij->i", cloud.points, cloud.points).min()))
-    plane = _plane(cloud)
     sight = unit(plane.middle)
     if not NEAREST < nearest < FARTHEST or abs(float(sight[2])) < AHEAD or abs(float(sight @ plane.normal)) < FLATTEST:
-        return ""
-    if not _finds(replace(cloud, viewpoints=np.zeros((1, 3)), view=None), config):
-        return ""
-    return "; with --viewpoint 0 0 0 one is: the cloud looks like one in its camera's own frame, and so would be the path"
+        return False
+    return _finds(replace(cloud, viewpoints=np.zeros((1, 3)), view=None), config)
 
 
 def _of_spacing(cloud: PointCloud) -> str:

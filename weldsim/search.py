@@ -26,7 +26,7 @@ def search(cloud: PointCloud, find: Callable[[PointCloud], SeamFindings]) -> tup
     tries = seen if len(seen) == 1 else (Side(cloud), *seen)
     found = [(side, find(side.cloud)) for side in tries]
     side, findings = max(found, key=lambda each: _worth(each[1]))
-    notes = [side.note] if side.note else []
+    notes = [*cloud.notes, *([side.note] if side.note else [])]
     return side.cloud, findings, tuple(notes + _places(side.cloud, findings.seams))
 
 

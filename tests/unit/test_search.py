@@ -68,6 +68,17 @@ def test_a_cloud_in_the_cameras_frame_is_told_and_the_remedy_works_and_says_so(s
     assert result.notes == ("the camera stood at the origin: the path is in the camera's own frame, not in the robot's base",)
 
 
+def test_a_cloud_in_the_cameras_frame_with_a_viewpoint_in_the_base_is_told_too(scan) -> None:
+    _, made = scan
+    X_BC = made.cloud.X_BC
+    optical = seen_from(PointCloud(points=X_BC.inverse().points(made.cloud.points)), *X_BC.p)
+    assert not plan(optical).findings.seams
+    told = hint(optical, CellConfig())
+    assert "with --viewpoint 0 0 0 one is: the cloud looks like one in its camera's own frame" in told
+    assert told.endswith("; --viewpoint is where the camera stood in the frame of the cloud")
+    assert len(plan(seen_from(optical, *named_viewpoint(told))).findings.seams) == 1
+
+
 def test_a_path_below_the_base_is_said(scan) -> None:
     _, made = scan
     opengl = made.cloud.X_BC.inverse().points(made.cloud.points) * [1, -1, -1]

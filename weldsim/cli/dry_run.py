@@ -262,7 +262,9 @@ class DryRunCommand(ConfigOptions):
             if trial.margins:
                 print(table([_margin_row(margin) for margin in trial.margins], ("figure", "worst", "limit", "at", "")))
             for fix in fixes:
-                print(f"  would pass: {fix.text}")
+                alone = f"{trial.name} alone " if fix.breaks else ""
+                told = f"; {', '.join(fix.breaks)} would fail with it" if fix.breaks else ""
+                print(f"  {alone}would pass: {fix.text}{told}")
                 print(f"    with {fix.how}")
             if rows and not fixes and not self.no_fix:
                 print("  no change that was tried would help")

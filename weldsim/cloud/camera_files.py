@@ -33,6 +33,7 @@ _KNOWN = {
     "plumbbob", "brown", "brownconrady", "brownconrad", "opencv", "radtan", "radialtangential", "rational", "rationalpolynomial",
     "opencvpinhole", "pinhole", "pinholeradtan", "fullopencv", "polynomial", "standard", "perspective", "thinprism",
 }  # fmt: skip
+_FOCAL = {"flx": "fx", "fly": "fy"}  # of NeRF's tools
 _OF_CAMERA = {"fx", "fy", "cx", "cy", "width", "height", *_NAMED}
 _NONE = {"none", "null", "", "no", "0"}
 _STRANGE_IF_ZERO = re.compile("fisheye|equidistant|kannala|ftheta|omni|ucm|doublesphere|fov|spherical|mei")
@@ -106,6 +107,7 @@ def _flattened(table: dict[str, Any]) -> dict[str, Any]:
         for key, value in inner.items():
             name = plain(key)
             name = name.removeprefix("camera") if name.startswith("camera") and name[6:] in _OF_CAMERA else name  # ORB-SLAM
+            name = _FOCAL.get(name, name)
             name = _radial_or_tangential(name, value) if str(key).strip() != "K" else name
             if name in _PASSED_OVER:
                 continue

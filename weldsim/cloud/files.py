@@ -21,9 +21,10 @@ from weldsim.cloud.pcd import read_pcd
 from weldsim.cloud.ply import read_ply
 from weldsim.cloud.ptx import is_ptx, read_ptx
 from weldsim.cloud.raw import RawCloud, Unreadable
+from weldsim.cloud.sensor_frame import placed
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
-from weldsim.columns import decode
+from weldsim.columns import decode, utf_16
 from weldsim.errors import CloudError, CloudFileError, OutputError
 from weldsim.output import write_whole
 from weldsim.records import PointCloud
@@ -31,7 +32,12 @@ from weldsim.records import PointCloud
 __all__ = ["LengthUnit", "check_plannable", "read_cloud", "read_depth_frame", "write_cloud", "write_depth_png"]
 
 LengthUnit = Literal["m", "cm", "mm", "in"]
-_OTHERS = {b"LASF": "a LAS or LAZ file", b"ASTM-E57": "an E57 file", b"solid ": "an STL mesh", b"OFF": "an OFF mesh"}
+_OTHERS = {
+    b"LASF": "a LAS or LAZ file", b"ASTM-E57": "an E57 file", b"solid ": "an STL mesh", b"OFF": "an OFF mesh",
+    b"glTF": "a glTF mesh", b"\x89HDF": "an HDF5 file, as Zivid's ZDF and MATLAB's are", b"MATLAB 5.0": "a MATLAB file",
+    b"#ROSBAG": "a ROS bag", b"\xff\xd8\xff": "a JPEG image", b"II*\0": "a TIFF image", b"MM\0*": "a TIFF image",
+    b"<!DOCTYPE": "a web page", b"<html": "a web page", b"<?xml": "an XML file", b"%PDF": "a PDF",
+}  # fmt: skip
 MIN_POINTS = 100  # fewer cannot show a groove
 SAMPLE = 20_000  # points tell the breadth of a cloud that is no line
 MIN_BREADTH = 0.001  # [m] rms breadth across the longest direction below which the points are a line
@@ -48,7 +54,8 @@ def read_cloud(
     those at 0 0 0 where several are.
 
     Args:
-        path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, told apart by content.
+        path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, told apart by content. Points in the frame of a sensor whose pose the file
+            gives are moved by it; the cloud's `notes` say so.
         unit: the file's unit of length; by default the one that its columns' names give, else metres.
         viewpoint: where the camera stood (3,) [m] in the same frame; it outranks what the file says.
         crop: lower and upper corner of the box that is kept [m]; by default everything is.
@@ -56,17 +63,17 @@ def read_cloud(
         CloudFileError: missing, unreadable, cut off, or no cloud.
         CloudError: no finite point, coordinates too coarse, an extent that shows that `unit` is wrong, or a camera too far away.
     """
-    data = read_bytes(path)
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):  # UTF-16, as spreadsheets save text
+    data, given = read_bytes(path), _given(viewpoint)
+    if utf_16(data) is not None:  # as spreadsheets save text
         data = decode(data).encode()
     try:
         with np.errstate(all="ignore"):  # signalling NaNs and the like are dropped below
-            raw = _reader(data)(data)
+            raw = placed(_reader(data)(data), given)
     except Unreadable as error:
         raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
     said = unit or raw.unit or "m"
     if raw.unit is not None and said != raw.unit:
-        raise CloudError(f"{path}: --units {said}, but its columns are named in {raw.unit}; leave --units out", path=str(path))
+        raise CloudError(f"{path}: --units {said}, but its header says {raw.unit}; leave --units out", path=str(path))
     scale = METRES[said]
     keep = _seen(raw.points)
     total, dropped = len(keep), int((~keep).sum())
@@ -81,14 +88,15 @@ def read_cloud(
         whole = bool(keep.all())
         points = (raw.points if whole else raw.points[keep]) * scale
         check_extent(str(path), points, said, dropped, raw)
-    viewpoints, view = _viewpoints(raw, scale, viewpoint)
-    check_viewpoints(str(path), points, viewpoints, option=viewpoint is not None)
+    viewpoints, view = _viewpoints(raw, scale, given)
+    check_viewpoints(str(path), points, viewpoints, option=given is not None)
     return PointCloud(
         points=points,
         normals=_unit_normals(raw.normals, keep),
         colours=None if raw.colours is None else raw.colours if whole else raw.colours[keep],
         viewpoints=viewpoints,
         view=None if view is None else view[keep],
+        notes=raw.notes,
     )
 
 
@@ -96,12 +104,16 @@ def _reader(data: bytes) -> Callable[[bytes], RawCloud]:
     """What reads `data`, from its first bytes."""
     if data[:3] == b"ply" and data[3:4] in (b"\n", b"\r", b" "):
         return read_ply
-    if data[:2] == b"PK" or data[:6] == b"\x93NUMPY":
-        return read_array_cloud
     if data[:4] == b"\x89PNG":
         raise Unreadable("it is a PNG image; a depth image needs its intrinsics beside it (--intrinsics)")
     if data[:2] == b"\x1f\x8b":
         raise Unreadable("it is gzip-compressed; unpack it first")
+    if data.startswith(b"version https://git-lfs"):
+        raise Unreadable("it is a pointer of Git LFS, not the file itself: git lfs pull fetches it")
+    if data[:2] == b"PK" and b"[Content_Types].xml" in data[:4096]:
+        raise Unreadable("it is an Excel workbook; save the sheet as CSV")
+    if data[:2] == b"PK" or data[:6] == b"\x93NUMPY":
+        return read_array_cloud
     for magic, name in _OTHERS.items():
         if data.startswith(magic):
             raise Unreadable(f"it is {name}; export the cloud as PLY, PCD or XYZ text")
@@ -140,14 +152,19 @@ def _unit_normals(normals: Float[ndarray, "n 3"] | None, keep: Bool[ndarray, "n"
         return kept / np.sqrt(squares)[:, None]
 
 
-def _viewpoints(
-    raw: RawCloud, scale: float, viewpoint: Sequence[float] | ndarray | None
-) -> tuple[Float[ndarray, "k 3"], ndarray | None]:
+def _given(viewpoint: Sequence[float] | ndarray | None) -> Float[ndarray, "3"] | None:
+    """Where the caller says that the camera stood [m]. Raises CloudError for what is no place."""
+    if viewpoint is None:
+        return None
+    given = np.asarray(viewpoint, float).reshape(-1)
+    if given.shape != (3,) or not np.isfinite(given).all():
+        raise CloudError(f"viewpoint {viewpoint!r}: three finite numbers in metres are needed", viewpoint=viewpoint)
+    return given
+
+
+def _viewpoints(raw: RawCloud, scale: float, given: Float[ndarray, "3"] | None) -> tuple[Float[ndarray, "k 3"], ndarray | None]:
     """Camera positions [m] and which of them saw each point, or none known."""
-    if viewpoint is not None:
-        given = np.asarray(viewpoint, float).reshape(-1)
-        if given.shape != (3,) or not np.isfinite(given).all():
-            raise CloudError(f"viewpoint {viewpoint!r}: three finite numbers in metres are needed", viewpoint=viewpoint)
+    if given is not None:
         return given[None], None
     found = raw.viewpoints
     if found is None or not np.isfinite(found).all() or len(found) == 0:

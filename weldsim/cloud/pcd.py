@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.cloud.raw import RawCloud, Unreadable, check_count, from_columns
+from weldsim.cloud.sensor_frame import rotation_of_quaternion
 from weldsim.cloud.table import parse_table
 
 _MAX_HEADER = 65_536
@@ -36,7 +37,8 @@ def read_pcd(data: bytes) -> RawCloud:
         case other:
             raise Unreadable(f"its data is {' '.join(other)[:40]!r}, not ascii, binary or binary_compressed")
     fields = {name: column for name, column in fields.items() if column.ndim == 1}
-    return from_columns(fields | _unpacked_colours(fields), viewpoints=_viewpoint(header))
+    viewpoints, R = _pose(header)
+    return from_columns(fields | _unpacked_colours(fields), viewpoints=viewpoints, rotation=R)
 
 
 def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
@@ -89,15 +91,18 @@ def _count(header: dict[str, list[str]]) -> int:
     return values[0]
 
 
-def _viewpoint(header: dict[str, list[str]]) -> Float[ndarray, "1 3"] | None:
-    """The camera position the header gives; the default, seven numbers of an identity, says nothing."""
+def _pose(header: dict[str, list[str]]) -> tuple[Float[ndarray, "1 3"] | None, Float[ndarray, "3 3"] | None]:
+    """Position and rotation of the sensor that the header gives; the default, seven numbers of an identity, says nothing."""
     try:
         numbers = [float(word) for word in header.get("VIEWPOINT", [])]
     except ValueError:
-        return None
-    if len(numbers) != 7 or numbers == [0, 0, 0, 1, 0, 0, 0] or not np.isfinite(numbers).all():
-        return None
-    return np.array([numbers[:3]])
+        return None, None
+    if len(numbers) != 7 or not np.isfinite(numbers).all():
+        return None, None
+    if numbers in ([0, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0, 0]):  # an identity whose w is last, and none at all
+        return None, None
+    R = rotation_of_quaternion(numbers[3:])
+    return (None, None) if R is None and not any(numbers[:3]) else (np.array([numbers[:3]]), R)
 
 
 def _ascii(text: bytes, row: np.dtype, count: int) -> dict[str, ndarray]:

@@ -4,13 +4,16 @@ Own reader because the counts of a header must be checked against the file befor
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.cloud.raw import RawCloud, Unreadable, check_count, from_columns
-from weldsim.cloud.table import parse_table
+from weldsim.cloud.sensor_frame import rotation_of_matrix
+from weldsim.cloud.table import TAKEN, parse_table
+from weldsim.columns import UNITS, unit_of_comments
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -19,8 +22,10 @@ _TYPES = {
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _MAX_HEADER = 65_536
+_COUNT, _LONGEST = "number of ", 4096  # name of a list's count, and items of a list that belongs to a vertex
 _VERTICES = ("vertex", "vertices", "point", "points")
 _VIEW = ("view_px", "view_py", "view_pz")
+_ROWS = tuple(tuple(f"{row}_axis{axis}" for axis in "xyz") for row in "xyz")  # of PCL's rotation matrix, whatever their names say
 
 
 @dataclass
@@ -42,7 +47,7 @@ class _Element:
 
 def read_ply(data: bytes) -> RawCloud:
     """The vertices of the PLY file `data`. Raises Unreadable."""
-    order, elements, viewpoints, start = _header(data)
+    order, elements, viewpoints, unit, start = _header(data)
     left = len(data) - start
     for element in elements:
         promised = element.count * element.least_size(order == "ascii")
@@ -57,8 +62,6 @@ def read_ply(data: bytes) -> RawCloud:
     at = names.index(name)
     before, vertex = elements[:at], elements[at]
     check_count(vertex.count)
-    if vertex.has_list:
-        raise Unreadable("its vertices hold a list property, which has no fixed size")
     labels = [entry[0] for entry in vertex.properties]
     if len(set(labels)) != len(labels):
         raise Unreadable("two of its vertex properties have the same name")
@@ -66,28 +69,35 @@ def read_ply(data: bytes) -> RawCloud:
         data = data.replace(b"\r", b"\n")
     read = _ascii_columns if order == "ascii" else _binary_columns
     columns = read(data, start, before, vertex, order)
+    R = None
     if viewpoints is None and elements[at + 1 :] and elements[at + 1].name == "camera" and not elements[at + 1].has_list:
-        viewpoints = _camera(read(data, start, [*before, vertex], elements[at + 1], order))
-    return from_columns(columns, viewpoints=viewpoints)
+        viewpoints, R = _camera(read(data, start, [*before, vertex], elements[at + 1], order))
+    return from_columns(columns, viewpoints=viewpoints, rotation=R, unit=unit)
 
 
-def _camera(columns: dict[str, ndarray]) -> Float[ndarray, "1 3"] | None:
-    """Where the camera stood, as PCL writes it after the points; its default, the origin, says nothing."""
+def _camera(columns: dict[str, ndarray]) -> tuple[Float[ndarray, "1 3"] | None, Float[ndarray, "3 3"] | None]:
+    """Position and rotation of the camera, as PCL writes them after the points; its default, the identity, says nothing."""
     if not all(name in columns and len(columns[name]) == 1 for name in _VIEW):
-        return None
+        return None, None
     place = np.array([[float(columns[name][0]) for name in _VIEW]])
-    return place if np.isfinite(place).all() and place.any() else None
+    if not np.isfinite(place).all():
+        return None, None
+    rows = np.array([[float(columns[name][0]) if name in columns else np.nan for name in names] for names in _ROWS])
+    R = rotation_of_matrix(rows)
+    return (None, None) if R is None and not place.any() else (place, R)
 
 
-def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | None, int]:
-    """Byte order ("ascii", "<" or ">"), elements, viewpoint from a comment, and where the body starts."""
+def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | None, str | None, int]:
+    """Byte order ("ascii", "<" or ">"), elements, viewpoint and unit from comments, and where the body starts."""
     end = data.find(b"end_header", 0, _MAX_HEADER)
     newline = min((i for i in (data.find(b"\n", end), data.find(b"\r", end)) if i >= 0), default=-1)
     if end < 0 or newline < 0:
         raise Unreadable("its PLY header does not end")
     start = newline + (2 if data[newline : newline + 2] == b"\r\n" else 1)
     order, elements, viewpoints = "", [], None
-    for line in data[:end].decode("latin1").splitlines()[1:]:
+    lines = data[:end].decode("latin1").splitlines()[1:]
+    unit = unit_of_comments([f"# {line}" for line in lines if line.startswith(("comment ", "obj_info "))])
+    for line in lines:
         match line.split():
             case ["format", "ascii", _]:
                 order = "ascii"
@@ -109,7 +119,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | N
                 raise Unreadable(f"its PLY header has the line {line[:60]!r}")
     if not order:
         raise Unreadable("its PLY header names no format")
-    return order, elements, viewpoints, start
+    return order, elements, viewpoints, next((name for name in TAKEN if unit and UNITS[name] == UNITS[unit]), None), start
 
 
 def _viewpoint(numbers: list[str]) -> Float[ndarray, "1 3"] | None:
@@ -125,8 +135,11 @@ def _ascii_columns(data: bytes, start: int, before: list[_Element], vertex: _Ele
             start = data.find(b"\n", start) + 1
             if start == 0:
                 raise Unreadable(f"it ends within its {element.name} elements")
-    table = parse_table(data[start:], columns=len(vertex.properties), rows=vertex.count)
-    return {entry[0]: _typed(table[:, i], entry[1]) for i, entry in enumerate(vertex.properties)}
+    fixed = vertex.properties[: next((i for i, entry in enumerate(vertex.properties) if len(entry) == 3), None)]
+    if len(fixed) < len(vertex.properties) and not {"x", "y", "z"} <= {entry[0] for entry in fixed}:
+        raise Unreadable("its vertices hold a list before x, y and z: export them without")
+    table = parse_table(data[start:], columns=len(fixed), rows=vertex.count)
+    return {entry[0]: _typed(table[:, i], entry[1]) for i, entry in enumerate(fixed)}
 
 
 def _typed(column: ndarray, kind: str) -> ndarray:
@@ -139,12 +152,33 @@ def _typed(column: ndarray, kind: str) -> ndarray:
 def _binary_columns(data: bytes, start: int, before: list[_Element], vertex: _Element, order: str) -> dict[str, ndarray]:
     for element in before:
         start = _skip(data, start, element, order)
-    row = np.dtype([(entry[0], order + entry[1]) for entry in vertex.properties])
+    row = _row(data, start, vertex, order)
     if start + vertex.count * row.itemsize > len(data):
         held = max(0, len(data) - start) // max(1, row.itemsize)
         raise Unreadable(f"its header promises {vertex.count} points, the file holds {held}: cut off?")
     table = np.frombuffer(data, row, vertex.count, start)
-    return {name: table[name] for name in row.names or ()}
+    for name in row.names or ():
+        if name.startswith(_COUNT) and (table[name] != table[name][0]).any():
+            raise Unreadable(f"the lists {name.removeprefix(_COUNT)!r} of its vertices have different lengths: export them without")
+    return {name: table[name] for name in row.names or () if not name.startswith(_COUNT) and table[name].ndim == 1}
+
+
+def _row(data: bytes, start: int, vertex: _Element, order: str) -> np.dtype:
+    """The layout of a vertex; a list is as long as the first vertex's. Raises Unreadable."""
+    layout: list[tuple[Any, ...]] = []
+    for entry in vertex.properties:
+        if len(entry) == 3:
+            at = start + np.dtype(layout).itemsize if layout else start
+            kind = np.dtype(order + entry[1])
+            if at + kind.itemsize > len(data) or kind.kind == "f":
+                raise Unreadable(f"the list {entry[0]!r} of its vertices has no count")
+            length = int(np.frombuffer(data, kind, 1, at)[0])
+            if not 0 <= length <= _LONGEST:
+                raise Unreadable(f"the list {entry[0]!r} of its vertices has {length} items (limit {_LONGEST})")
+            layout += [(_COUNT + entry[0], kind), (entry[0], order + entry[2], (length,))]
+        else:
+            layout.append((entry[0], order + entry[1]))
+    return np.dtype(layout)
 
 
 def _skip(data: bytes, start: int, element: _Element, order: str) -> int:

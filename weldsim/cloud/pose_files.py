@@ -103,8 +103,17 @@ def _leaves(node: dict[str, Any], parent: str) -> Iterator[tuple[str, Any]]:
         yield "quaternionxyzw", [rest.pop(f"q{key}") for key in "xyzw"]
     if {"x", "y", "z"} <= set(rest):
         yield "position", [rest.pop(key) for key in "xyz"]
-    if {"roll", "pitch", "yaw"} <= set(rest):
-        yield "rpy", [rest.pop(key) for key in ("roll", "pitch", "yaw")]
+    for unit in ("mm", "cm", "m"):
+        if {f"x{unit}", f"y{unit}", f"z{unit}"} <= set(rest):
+            yield f"position{unit}", [rest.pop(f"{key}{unit}") for key in "xyz"]
+    for unit in ("", "deg", "rad"):
+        if {f"roll{unit}", f"pitch{unit}", f"yaw{unit}"} <= set(rest):
+            yield f"rpy{unit}", [rest.pop(f"{key}{unit}") for key in ("roll", "pitch", "yaw")]
+        if {f"rx{unit}", f"ry{unit}", f"rz{unit}"} <= set(rest):
+            raise Unreadable(
+                f"rx{unit}, ry{unit}, rz{unit}: a rotation vector, or angles about three axes? give rotation_vector [rx, ry, rz] in"
+                " radians, or rpy"
+            )
     for key, value in rest.items():
         if key in _PASSED_OVER:
             continue

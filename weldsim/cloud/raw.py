@@ -26,6 +26,8 @@ class RawCloud:
         view: (n,) which viewpoint saw each point, or None.
         unit: of length, "m", "cm", "mm" or "in", where the file says; None where it does not.
         numbered: whether what was read as x counts the rows.
+        rotation: (3, 3) of the one sensor in the frame of its viewpoint, where the file gives one that is not the identity.
+        notes: what was done to the points, one sentence each, for people.
     """
 
     points: Float[ndarray, "n 3"]
@@ -35,6 +37,8 @@ class RawCloud:
     view: ndarray | None = None
     unit: str | None = None
     numbered: bool = False
+    rotation: Float[ndarray, "3 3"] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def check_count(count: int) -> None:
@@ -51,7 +55,11 @@ COLOURS = [("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_g
 
 
 def from_columns(
-    columns: Mapping[str, ndarray], *, viewpoints: Float[ndarray, "k 3"] | None = None, unit: str | None = None
+    columns: Mapping[str, ndarray],
+    *,
+    viewpoints: Float[ndarray, "k 3"] | None = None,
+    rotation: Float[ndarray, "3 3"] | None = None,
+    unit: str | None = None,
 ) -> RawCloud:
     """The cloud in named columns of equal length. Raises Unreadable when x, y or z is not among them."""
 
@@ -71,7 +79,7 @@ def from_columns(
     if colours is not None:
         whole = all(columns[name].dtype.kind in "iu" for names in COLOURS for name in names if name in columns)
         colours = unit_colours(colours, whole=whole)
-    return RawCloud(points=points, normals=stack(NORMALS), colours=colours, viewpoints=viewpoints, unit=unit)
+    return RawCloud(points=points, normals=stack(NORMALS), colours=colours, viewpoints=viewpoints, unit=unit, rotation=rotation)
 
 
 def unit_colours(colours: Float[ndarray, "n 3"], *, whole: bool = False) -> Float[ndarray, "n 3"]:

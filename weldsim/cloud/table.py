@@ -4,15 +4,29 @@ import io
 import re
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.cloud.raw import COLOURS, NORMALS, XYZ, RawCloud, Unreadable, check_count, from_columns, unit_colours
-from weldsim.columns import HEADER_LINES, SAMPLE, UNITS, TextTable, by_role, counts, decode, find_table, is_number
+from weldsim.columns import (
+    HEADER_LINES,
+    SAMPLE,
+    UNITS,
+    TextTable,
+    by_role,
+    counts,
+    decode,
+    find_table,
+    is_number,
+    unit_of_comments,
+    without_thousands,
+)
 
 _HEAD = 1 << 20  # bytes in which the first row is looked for
+_SAMPLE = 1 << 17  # bytes in which marks between thousands are looked for
 _DIGITS = b"0123456789+-.eE,; \t\r\n"
 _NO_NUMBER = re.compile(
     rb"[-+]?(?:1\.#(?:QNAN|SNAN|IND|INF)\d*|nan\(\w*\)|(?<![^\s,;])(?:#?n/?a|null|none)(?![^\s,;]))", re.IGNORECASE
@@ -21,7 +35,7 @@ _EMPTY = re.compile(rb"(?:(?<=[,;\t])|^)[ ]*(?=[,;\t])|(?<=[,;\t])[ ]*$", re.MUL
 _BRACKETED = re.compile(rb"(?:[^\n]*\n)?\s*[\[({|]*\s*[-+.\d][^\n]*[\])}|]")
 _BETWEEN = re.compile(rb"[\])}][ \t]*,?\s*[\[({]")
 _BRACKETS = bytes.maketrans(b"[](){}|", b" " * 7)
-_TAKEN = ("m", "cm", "mm", "in")  # units that read_cloud knows by these names
+TAKEN = ("m", "cm", "mm", "in")  # units that read_cloud knows by these names
 
 
 def parse_table(
@@ -76,7 +90,7 @@ def read_text(data: bytes) -> RawCloud:
         raise Unreadable("it is binary, and no PLY, PCD, NPZ or NPY")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    data = plain_nans(data)
+    data = _ungrouped(plain_nans(data))
     lines = _head(data)
     table = find_table(lines)
     if table is None and _BRACKETED.match(data) is not None:  # as Python prints lists, or between bars
@@ -88,15 +102,26 @@ def read_text(data: bytes) -> RawCloud:
     columns, units = _columns(table, lines[table.first : table.first + SAMPLE])
     points = _read(data, table, list(columns.values()))
     check_count(len(points))
+    said = unit_of_comments(lines[: table.first])
+    said = next((name for name in TAKEN if said is not None and UNITS[name] == UNITS[said]), None)
     if table.names is None:
-        return _unnamed(points, table.width)
+        _check_grid(points, table, lines[table.first : table.first + SAMPLE])
+        return replace(_unnamed(points, table.width), unit=said)
     named = dict(zip(columns, points.T, strict=True))
     scales = [UNITS[unit] for unit in units.values()]
-    same = len(set(scales)) == 1 and next((name for name in _TAKEN if UNITS[name] == scales[0]), None)
+    same = len(set(scales)) == 1 and next((name for name in TAKEN if UNITS[name] == scales[0]), None)
     if units and not same:  # each its own, or one that nobody can ask for: metres then
         for axis in XYZ[0]:
             named[axis] = named[axis] * UNITS[units.get(axis, "m")]
-    return from_columns(named, unit=same or ("m" if units else None))
+    return from_columns(named, unit=same or ("m" if units else said))
+
+
+def _ungrouped(data: bytes) -> bytes:
+    """The text without marks between thousands, where its first rows have some."""
+    head = data[:_SAMPLE]
+    if not any(mark in head for mark in (b";", b"\t", b'"')) or without_thousands(decode(head)) == decode(head):
+        return data
+    return without_thousands(decode(data)).encode()
 
 
 def _head(data: bytes) -> list[str]:
@@ -139,6 +164,23 @@ def _check_decimals(table: TextTable, rows: Sequence[str]) -> None:
     whole = all(re.fullmatch(r"[-+]?\d+", cell) for row in cells for cell in row)
     if whole and any(re.fullmatch(r"0\d+", cell) for row in cells for cell in row[1::2]):
         raise Unreadable("its numbers seem to have decimal commas, and commas between them: put ; between them")
+
+
+def _check_grid(points: Float[ndarray, "n k"], table: TextTable, rows: Sequence[str]) -> None:
+    """Raises Unreadable where two whole numbers stand before three others: row and column of a scan, and then x y z."""
+    cells = [row for row in map(table.cells, rows) if len(row) == table.width]
+    if table.width < 5 or len(points) < 100 or not (points[:, :2] == np.round(points[:, :2])).all():
+        return
+    after = [row[2:5] for row in cells if all(map(is_number, row[:5]))]
+    if (
+        after
+        and all(any("." in row[i] for row in after) for i in range(3))
+        and not any("." in cell for row in cells for cell in row[:2])
+    ):
+        raise Unreadable(
+            "its first two columns are whole numbers and three others follow, row and column of a scan perhaps: name the columns in"
+            " a first line (row column x y z, say)"
+        )
 
 
 def _read(data: bytes, table: TextTable, columns: list[int]) -> Float[ndarray, "n k"]:

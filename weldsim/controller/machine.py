@@ -4,7 +4,7 @@ Servers and fault injection call its methods between two ticks; nothing here kno
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 from weldsim.controller.arm import Arm
 from weldsim.controller.config import ControllerConfig
@@ -58,15 +58,16 @@ class Machine:
         self.on_message: Callable[[str], None] | None = None
         self.history: deque[list[float]] = deque([arm.q], maxlen=100)
         self._builtins: Mapping[str, Callable] = {}
+        self._elsewhere: Collection[str] = ()
         self._program: Program | None = None
         self._compiled: dict[str, Compiled] = {}
         self._beside: list[Program] = []
         self._stopped_at = 0.0
         self._snapshot: Snapshot | None = None
 
-    def provide(self, builtins: Mapping[str, Callable]) -> None:
-        """The functions that programs can call."""
-        self._builtins = builtins
+    def provide(self, builtins: Mapping[str, Callable], elsewhere: Collection[str] = ()) -> None:
+        """The functions that programs can call, and the names of those that an e-Series alone has, where this is none."""
+        self._builtins, self._elsewhere = builtins, elsewhere
 
     @property
     def snapshot(self) -> Snapshot:
@@ -145,7 +146,9 @@ class Machine:
             self._compiled = {text: compiled}  # a client uploads its script again and again
             program = Program(compiled, self._builtins)
         except ScriptError as error:
-            self.say(f"script refused: {error}")
+            other = any(f"no function {name!r}" in str(error) for name in self._elsewhere)
+            hint = "; an e-Series has it: start the controller with --profile e" if other else ""
+            self.say(f"script refused: {error}{hint}")
             return False
         if compiled.kind == "sec":
             self._beside.append(program)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from weldsim.controller.connection import Connection, Session
 from weldsim.controller.dashboard import Dashboard, DashboardSession
 from weldsim.controller.faults import FaultSession
-from weldsim.controller.functions import builtins
+from weldsim.controller.functions import builtins, elsewhere
 from weldsim.controller.machine import Machine
 from weldsim.controller.primary import PrimarySession
 from weldsim.controller.realtime import RealtimeSession
@@ -36,7 +36,7 @@ class Server:
     def __init__(self, machine: Machine, host: str = "127.0.0.1") -> None:
         """Raises InputError where an address or port cannot be had."""
         self.machine, self.host = machine, host
-        machine.provide(builtins(machine))
+        machine.provide(builtins(machine), elsewhere(machine))
         dashboard, claims = Dashboard(machine), Claims()
         sessions: dict[int, Callable[[], Session]] = {
             DASHBOARD: lambda: DashboardSession(dashboard),

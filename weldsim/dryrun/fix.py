@@ -366,10 +366,11 @@ def _held(program: Program, index: int, cell: Cell) -> bool:
 def changed_program(program: Program, turn: float = 0.0, move: Float[ndarray, "3"] | None = None) -> Program:
     """The program with every pose turned about the wire and moved; joint targets stay."""
     shift = np.zeros(3) if move is None else move
-    motions = tuple(
-        motion if motion.X_BT is None else replace(motion, X_BT=shifted(turned_about_wire(motion.X_BT, turn), shift))
-        for motion in program.motions
-    )
+
+    def changed(X_BT: Transform | None) -> Transform | None:
+        return None if X_BT is None else shifted(turned_about_wire(X_BT, turn), shift)
+
+    motions = tuple(replace(motion, X_BT=changed(motion.X_BT), way=changed(motion.way)) for motion in program.motions)
     return replace(program, motions=motions)
 
 

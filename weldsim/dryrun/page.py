@@ -46,6 +46,10 @@ def write_page(
     return write_whole(path, _page(f"dry run of {result.source}", "".join(body), drawn))
 
 
+def _broken(fix: Fix) -> str:
+    return f"; {escape(', '.join(fix.breaks))} would fail with it" if fix.breaks else ""
+
+
 def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[dict[str, Any]], speed_limit: float) -> str:
     failure = trial.failure
     said = f"{units.to_mm(trial.length):.0f} mm long, {len(trial.verdicts)} waypoints"
@@ -53,7 +57,8 @@ def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[
     if failure is not None:
         parts.append(f'<ul class="reasons"><li>{escape(place(failure))}: {escape(failure.why)}: {escape(failure.text)}</li></ul>')
         listed = "".join(
-            f"<li>{escape(fix.text)} (applied and checked: passes)<br><code>{escape(fix.how)}</code></li>" for fix in fixes
+            f"<li>{escape(fix.text)} (applied and checked: passes{_broken(fix)})<br><code>{escape(fix.how)}</code></li>"
+            for fix in fixes
         )
         parts.append(f"<h2>What would help</h2><ul>{listed}</ul>" if fixes else "<p>No change that was tried would help.</p>")
     parts += [f"<p>{escape(note)}</p>" for note in trial.notes]

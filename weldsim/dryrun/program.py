@@ -13,7 +13,7 @@ from weldsim.records import TorchPath
 
 __all__ = ["Base", "Command", "Motion", "Program", "Tool"]
 
-Command = Literal["movej", "movel", "movep", "servoj"]
+Command = Literal["movej", "movel", "movep", "movec", "servoj"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,6 +25,7 @@ class Motion:
         q: (6,) the joint target [rad], or None.  X_BT: the torch target, or None; one of both is given.
         speed: asked for, of the tip [m/s] or the leading joint [rad/s].  acceleration: likewise.
         t: time asked for [s], 0 where speed rules.  arc: whether the arc burns.
+        way: of a movec, a batch of torch poses along its circle, evenly spaced, the last of them X_BT; None of any other.
     """
 
     command: Command
@@ -35,6 +36,7 @@ class Motion:
     acceleration: float
     t: float = 0.0
     arc: bool = False
+    way: Transform | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,8 @@ from weldsim.urscript.check import six
 from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.values import Pose
 
+INSIDE = ("to_joints", "to_pose", "to_flange", "tcp_pose")  # of RobotState's methods: no functions of URScript
+
 
 class RobotState:
     """Functions of a program that ask where the arm is. Where it stands before its first motion is known where it was said.
@@ -45,10 +47,14 @@ class RobotState:
         return self._joints("get_target_joint_positions").tolist()
 
     def get_actual_tcp_pose(self) -> Pose:
-        return self._tcp_pose("get_actual_tcp_pose")
+        return self.tcp_pose("get_actual_tcp_pose")
 
     def get_target_tcp_pose(self) -> Pose:
-        return self._tcp_pose("get_target_tcp_pose")
+        return self.tcp_pose("get_target_tcp_pose")
+
+    def tool_pose(self) -> Pose:
+        """As PolyScope writes the tool's feature."""
+        return self.tcp_pose("tool_pose")
 
     def get_actual_tool_flange_pose(self) -> Pose:
         return _pose(self._since[-1] if self._since else flange_pose(self._joints("get_actual_tool_flange_pose")))
@@ -90,7 +96,8 @@ class RobotState:
     def _flange(self, pose: list[float]) -> Transform:
         return self._pose_of(pose) @ self.mount.inverse()
 
-    def _tcp_pose(self, name: str) -> Pose:
+    def tcp_pose(self, name: str) -> Pose:
+        """Where the TCP is by then. Raises ScriptError in the name of whoever asks, where that is not known."""
         X_BF = self._since[-1] if self._since else flange_pose(self._joints(name))
         return _pose(X_BF @ self.mount)
 

@@ -10,6 +10,7 @@ from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
 from weldsim.dryrun.margins import margins
 from weldsim.dryrun.program import Program
+from weldsim.dryrun.together import for_all
 from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import DryRun
 from weldsim.dryrun.waypoints import try_waypoints
@@ -33,7 +34,7 @@ def dry_run(
         fix: whether to look for changes that help.  tell: told what is being done.
     """
     config = config or MotionConfig()
-    trials, fixes = [], []
+    trials, fixes, all_followed = [], [], []
     if program.kind == "script":
         tell("program", None)
         trials.append(try_script(program, cell))
@@ -44,6 +45,10 @@ def dry_run(
         trials.append(trial)
         told = partial(tell, "fixes")
         fixes.append(fixes_for_path(followed, trial, cell, config, told, given=program.given) if fix else ())
+        all_followed.append(followed)
+    if len(program.paths) > 1 and any(fixes):
+        tell("fixes", None)
+        fixes = for_all(fixes, all_followed, trials, cell, config, program.given)
     trials = [replace(trial, margins=margins(trial, cell, config)) for trial in trials]
     notes = (*program.notes, *cell.notes, *_beside_table(program, cell))
     return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=notes)

@@ -7,7 +7,7 @@ def _words(text: str) -> tuple[str, ...]:
 
 MOVING = _words(
     """
-    movec optimovej optimovel speedj speedl speedl_at servoc servol force_mode force_mode_example teach_mode freedrive_mode
+    optimovej optimovel speedj speedl speedl_at servoc servol force_mode force_mode_example teach_mode freedrive_mode
     freedrive_mode_no_incorrect_payload_check screw_driving path_offset_enable path_offset_set track_conveyor_linear
     track_conveyor_circular move_until_contact direct_torque
     """
@@ -61,7 +61,7 @@ RESTING = ("stopj", "stopl")
 """What moves is at rest already."""
 OUTPUTS = ("set_digital_out", "set_standard_digital_out", "set_configurable_digital_out", "set_tool_digital_out")
 """May strike the arc."""
-CHECKED = ("movej", "movel", "movep", "servoj")
+CHECKED = ("movej", "movel", "movep", "movec", "servoj")
 """Move the arm, and are checked."""
 MOVES = frozenset((*CHECKED, *MOVING, *RESTING, "set_tcp"))
 """What a statement must not call that is passed over: it moves the arm, stops it, or changes what poses mean."""

@@ -1,6 +1,7 @@
 """A robot program tried: each motion as the controller would make it, in the branch the arm is in."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -10,7 +11,7 @@ from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.path_faults import BACK, FASTEST, LEAST_BACK
 from weldsim.dryrun.program import Motion, Program
 from weldsim.dryrun.verdict import Trial, Verdict, Why
-from weldsim.frames import Transform, rotation_vector_from_matrix, slerp
+from weldsim.frames import Transform, rotation_vector_from_matrix, slerp, unit
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, SPEED_LIMIT, inverse, torch_pose
 from weldsim.motion.arm import dexterity
 from weldsim.motion.rungs import SINGULAR
@@ -95,19 +96,22 @@ def try_script(program: Program, cell: Cell) -> Trial:
 def _turning_back(program: Program) -> tuple[str, ...]:
     """Where a process move (movep, or a straight one with the arc on) leads back over the one before it, one sentence each."""
     out = []
-    targets = [
-        None if motion.X_BT is None or motion.command not in ("movel", "movep") else motion.X_BT.p for motion in program.motions
-    ]
-    for a, b, c, motion, after in zip(targets, targets[1:], targets[2:], program.motions[1:], program.motions[2:], strict=False):
-        process = all(each.command == "movep" or each.arc for each in (motion, after))
-        if a is None or b is None or c is None or not process:
+    legs = [(motion, _leg(before, motion)) for before, motion in pairwise(program.motions)]
+    for (motion, there), (after, back) in pairwise(legs):
+        process = all(each.command in ("movep", "movec") or each.arc for each in (motion, after))
+        if there is None or back is None or not process:
             continue
-        there, back = b - a, c - b
-        lengths = np.linalg.norm(there), np.linalg.norm(back)
-        if min(lengths) > LEAST_BACK and float(there @ back) < np.cos(BACK) * lengths[0] * lengths[1]:
-            turn = np.rad2deg(np.arccos(np.clip(there @ back / (lengths[0] * lengths[1]), -1.0, 1.0)))
-            out.append(f"line {after.line} {after.command}: travel turns back by {turn:.0f} deg")
+        turn = np.arccos(np.clip(unit(there[-1] - there[-2]) @ unit(back[1] - back[0]), -1.0, 1.0))
+        if min(np.linalg.norm(np.diff(leg, axis=0), axis=1).sum() for leg in (there, back)) > LEAST_BACK and turn > BACK:
+            out.append(f"line {after.line} {after.command}: travel turns back by {np.rad2deg(turn):.0f} deg")
     return tuple(out)
+
+
+def _leg(before: Motion, motion: Motion) -> Float[ndarray, "n 3"] | None:
+    """Places of the torch along a straight motion or an arc [m]; None of another, and where the one before it was another."""
+    if any(each.X_BT is None or each.command not in ("movel", "movep", "movec") for each in (before, motion)):
+        return None
+    return np.vstack([before.X_BT.p, motion.X_BT.p if motion.way is None else motion.way.p])  # type: ignore[union-attr]
 
 
 def _bad_start(q: Float[ndarray, "6"], cell: Cell) -> str:
@@ -180,15 +184,10 @@ def _joint_move(motion: Motion, q: Float[ndarray, "6"]) -> _Way:
 
 
 def _straight(motion: Motion, q: Float[ndarray, "6"]) -> _Way:
-    """movel, movep: the tip on a straight line, the orientation turning evenly, the arm in the branch it is in."""
-    begin = torch_pose(q)
-    end = motion.X_BT if motion.X_BT is not None else torch_pose(motion.q)  # type: ignore[arg-type]
-    length = float(np.linalg.norm(end.p - begin.p))
-    turn = float(np.linalg.norm(rotation_vector_from_matrix(begin.R.T @ end.R)))
-    n = max(1, int(np.ceil(max(length / STEP_LENGTH, turn / STEP_TURN))))
+    """movel, movep: the tip on a straight line, the orientation turning evenly; movec: on its arc; in the branch the arm is in."""
+    X_BT, length, turn = _line(motion, torch_pose(q)) if motion.way is None else _arc(motion.way, torch_pose(q))
+    n = len(X_BT.p) - 1
     u = np.linspace(0.0, 1.0, n + 1)
-    R = slerp(np.tile(begin.quaternion, (n + 1, 1)), np.tile(end.quaternion, (n + 1, 1)), u)
-    X_BT = Transform.from_quaternion("BT", R, begin.p + u[:, None] * (end.p - begin.p))
     fastest = motion.speed if not motion.t else length / motion.t
     duration = motion.t or max(
         _trapezoid(length, motion.speed, motion.acceleration),
@@ -226,6 +225,24 @@ def _straight(motion: Motion, q: Float[ndarray, "6"]) -> _Way:
         near = float(dexterity(out.q[i][None])[0]) < 3 * SINGULAR
         return replace(out, why="singular" if near else "speed", text=text, at=i)
     return out
+
+
+def _line(motion: Motion, begin: Transform) -> tuple[Transform, float, float]:
+    """Poses on the straight way from one to the motion's target, the length of it [m], and by how much the torch turns [rad]."""
+    end = motion.X_BT if motion.X_BT is not None else torch_pose(motion.q)  # type: ignore[arg-type]
+    length = float(np.linalg.norm(end.p - begin.p))
+    turn = float(np.linalg.norm(rotation_vector_from_matrix(begin.R.T @ end.R)))
+    n = max(1, int(np.ceil(max(length / STEP_LENGTH, turn / STEP_TURN))))
+    u = np.linspace(0.0, 1.0, n + 1)
+    R = slerp(np.tile(begin.quaternion, (n + 1, 1)), np.tile(end.quaternion, (n + 1, 1)), u)
+    return Transform.from_quaternion("BT", R, begin.p + u[:, None] * (end.p - begin.p)), length, turn
+
+
+def _arc(way: Transform, begin: Transform) -> tuple[Transform, float, float]:
+    """The same for a way that is given, from where the torch is."""
+    X_BT = Transform("BT", np.concatenate([begin.R[None], way.R]), np.vstack([begin.p, way.p]))
+    turns = rotation_vector_from_matrix(np.swapaxes(X_BT.R[:-1], -1, -2) @ X_BT.R[1:])
+    return X_BT, float(np.linalg.norm(np.diff(X_BT.p, axis=0), axis=1).sum()), float(np.linalg.norm(turns, axis=1).sum())
 
 
 def _near(X_BT: Transform | None, q: Float[ndarray, "6"]) -> Float[ndarray, "6"] | None:

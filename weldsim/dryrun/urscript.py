@@ -15,13 +15,15 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.dryrun.program import Command, Motion, Program
-from weldsim.dryrun.robot_state import RobotState
+from weldsim.dryrun.robot_state import INSIDE, RobotState
 from weldsim.dryrun.script_names import ASKING, MOVES, MOVING, OUTPUTS, RESTING, SILENT
 from weldsim.dryrun.script_notes import ScriptNotes
 from weldsim.dryrun.unknown import UNKNOWN_OPERATIONS, NoSolution, Unknown, UntoldError, spreading, unknown_among
 from weldsim.errors import InputError
 from weldsim.frames import Transform
+from weldsim.motion.sweep import STEP_LENGTH
 from weldsim.mounts import X_FT
+from weldsim.urscript.arc import Arc
 from weldsim.urscript.check import is_pose, six
 from weldsim.urscript.compiler import FILE, Compiled, compile_program
 from weldsim.urscript.effects import Effects
@@ -29,7 +31,7 @@ from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.geometry import PoseFunctions
 from weldsim.urscript.numbers import NumberFunctions
 from weldsim.urscript.strings import StringFunctions
-from weldsim.urscript.values import number
+from weldsim.urscript.values import Pose, number
 
 TURNS = 10_000  # of all loops together; more is a program that does not end
 LOOKED_AFTER, REPEATS, LONGEST_ROUND = 1000, 4, 500  # turns; rounds that must be alike, and motions of one at most
@@ -65,7 +67,7 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
             path=source,
         )
     if not recorder.motions:
-        raise InputError(f"{source}: makes no movej, movel, movep or servoj; there is nothing to check", path=source)
+        raise InputError(f"{source}: makes no movej, movel, movep, movec or servoj; there is nothing to check", path=source)
     if len(recorder.motions) < 2:
         raise InputError(f"{source}: 1 motion; a path needs two", path=source)
     return Program(
@@ -123,7 +125,7 @@ class _Recorder:
             name: spreading(getattr(group, name))
             for group in groups
             for name in dir(group)
-            if not name.startswith("_") and callable(getattr(group, name))
+            if not name.startswith("_") and name not in INSIDE and callable(getattr(group, name))
         }
         solve = out["get_inverse_kin"]
 
@@ -135,10 +137,10 @@ class _Recorder:
         out["get_inverse_kin"] = get_inverse_kin
         out |= {name: self._asking(name) for name in ASKING}
         out |= {name: self._passed_over(name) for name in SILENT}
-        out |= {name: _refusing(f"{name}: its motion is not checked; use movej, movel, movep or servoj") for name in MOVING}
+        out |= {name: _refusing(f"{name}: its motion is not checked; use movej, movel, movep, movec or servoj") for name in MOVING}
         out |= dict.fromkeys(RESTING, lambda *_, **__: None)
         out |= {name: self._output(name) for name in OUTPUTS}
-        mine = (self.movej, self.movel, self.movep, self.servoj, self.set_tcp)
+        mine = (self.movej, self.movel, self.movep, self.movec, self.servoj, self.set_tcp)
         return out | {function.__name__: function for function in mine} | {"sleep": self.sleep}
 
     def movej(self, q: Any, a: Any = 1.4, v: Any = 1.05, t: Any = 0, r: Any = 0) -> None:
@@ -149,6 +151,22 @@ class _Recorder:
 
     def movep(self, pose: Any, a: Any = 1.2, v: Any = 0.25, r: Any = 0) -> None:
         self._move("movep", pose, a, v, 0, r)
+
+    def movec(self, pose_via: Any, pose_to: Any, a: Any = 1.2, v: Any = 0.25, r: Any = 0, mode: Any = 0) -> None:
+        bool(unknown_among(pose_via, pose_to, mode))
+        if not all(is_pose(pose) and len(pose) == 6 for pose in (pose_via, pose_to)):
+            raise ScriptError("movec: its poses must be p[x, y, z, rx, ry, rz]")
+        via, end = (six(pose, f"movec: {name}") for pose, name in ((pose_via, "pose_via"), (pose_to, "pose_to")))
+        for pose in (via, end):
+            _check_pose(pose, "movec: ", "from the base", FURTHEST)
+        if number(mode) not in (0, 1):
+            raise ScriptError(f"movec: mode = {mode} is neither 0 nor 1")
+        circle = Arc(self.state.tcp_pose("movec"), via, end, fixed=bool(mode))
+        steps = max(2, int(np.ceil(circle.length / STEP_LENGTH)))
+        poses = np.array([circle.at(share) for share in np.linspace(0.0, 1.0, steps + 1)[1:]])
+        X_BE = Transform.from_rotation_vector("BT", poses[:, 3:], poses[:, :3])
+        way = X_BE @ self.state.mount.inverse() @ X_FT
+        self._move("movec", Pose(poses[-1].tolist()), a, v, 0, r, way)
 
     def servoj(self, q: Any, a: Any = 0, v: Any = 0, t: Any = 0.008, lookahead_time: Any = 0.1, gain: Any = 300) -> None:
         bool(unknown_among(t))
@@ -174,7 +192,7 @@ class _Recorder:
             raise ScriptError(f"sleep: {t:g} s must not be negative")
         self.pauses += t
 
-    def _move(self, name: Command, target: Any, a: Any, v: Any, t: Any, r: Any) -> None:
+    def _move(self, name: Command, target: Any, a: Any, v: Any, t: Any, r: Any, way: Transform | None = None) -> None:
         bool(unknown_among(a, v, t, r))
         if not (0 < number(v) < np.inf and 0 < number(a) < np.inf):
             raise ScriptError(f"{name}: speed {v:g} and acceleration {a:g} must be positive")
@@ -182,11 +200,13 @@ class _Recorder:
             raise ScriptError(f"{name}: time {t:g} s and blend radius {r:g} m must not be negative")
         if r > 0:
             self.notes.add("blend", "blends are not modelled: each motion is checked as if it came to rest at its target")
-        self._record(name, target, float(v), float(a), t)
+        self._record(name, target, float(v), float(a), t, way)
 
-    def _record(self, name: Command, target: Any, speed: float, acceleration: float, t: float) -> None:
+    def _record(
+        self, name: Command, target: Any, speed: float, acceleration: float, t: float, way: Transform | None = None
+    ) -> None:
         q, X_BT = self._joints_and_pose(name, target)
-        kept = {"speed": speed, "acceleration": acceleration, "t": float(t), "arc": bool(self.on)}
+        kept = {"speed": speed, "acceleration": acceleration, "t": float(t), "arc": bool(self.on), "way": way}
         self.motions.append(Motion(command=name, line=self._line() or 0, q=q, X_BT=X_BT, **kept))  # type: ignore[arg-type]
 
     def _joints_and_pose(self, name: Command, target: Any) -> tuple[Float[ndarray, "6"] | None, Transform | None]:

@@ -51,7 +51,7 @@ class Verdict:
 
 @dataclass(frozen=True, kw_only=True)
 class Fix:
-    """A change after which the job passes: it was applied and the whole job checked again.
+    """A change after which a path passes, and the whole job with it unless `breaks` says otherwise: it was applied and checked.
 
     Attributes:
         kind: what is changed.  text: the change in words.
@@ -59,6 +59,7 @@ class Fix:
         turn: about the wire [rad].  move: of the part, in the base [m].  speed: of the weld [m/s].  cut: arc lengths [m].
         approach: length of lead-in and lead-out [m], `motion.approach`.
         how: what makes the change, options to be added to the command or lines of the scene's file.
+        breaks: names of the job's other paths that fail with it.
     """
 
     kind: Literal["turn about the wire", "lean the torch", "take away", "move the part", "slower", "cut the weld", "lead-in"]
@@ -71,6 +72,7 @@ class Fix:
     cut: tuple[float, ...] = ()
     approach: float = 0.0
     how: str = ""
+    breaks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -185,6 +187,7 @@ def _trial_json(trial: Trial, fixes: tuple[Fix, ...]) -> dict[str, Any]:
                 "cut": list(fix.cut),
                 "approach": fix.approach,
                 "how": fix.how,
+                "breaks": list(fix.breaks),
             }
             for fix in fixes
         ],

@@ -98,6 +98,7 @@ class PointCloud:
         view: (n,) which viewpoint saw each point; None when k <= 1.
         pixel: (n,) row * width + column of each point in the depth image of its view, or None.
         intrinsics, X_BC: of that depth image, or None; X_BC is a batch, one pose a viewpoint, where there are several.
+        notes: what was done to the points while they were read, one sentence each, for people.
     """
 
     points: Float[ndarray, "n 3"]
@@ -109,6 +110,7 @@ class PointCloud:
     pixel: Int[ndarray, "n"] | None = None
     intrinsics: CameraIntrinsics | None = None
     X_BC: Transform | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         store(self, "points", self.points, shape=("n", 3))
@@ -147,6 +149,7 @@ class PointCloud:
             pixel=pick(self.pixel),
             intrinsics=self.intrinsics,
             X_BC=self.X_BC,
+            notes=self.notes,
         )
 
     def sight_origins(self) -> Float[ndarray, "n 3"] | None:

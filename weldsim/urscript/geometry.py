@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from weldsim.urscript.check import six
+from weldsim.urscript.check import is_pose, six
 from weldsim.urscript.errors import ScriptError
 from weldsim.urscript.poses import inverse_matrix, matrix_of, pose_between, pose_of
 from weldsim.urscript.values import Pose, number
@@ -21,6 +21,16 @@ class PoseFunctions:
 
     def pose_inv(self, p_from: Any) -> Pose:
         return Pose(pose_of(inverse_matrix(matrix_of(six(p_from, "p_from")))))
+
+    def inv(self, m: Any) -> Any:
+        """The inverse of a pose, or of a square matrix."""
+        if is_pose(m):
+            return self.pose_inv(m)
+        try:
+            matrix = np.array([[number(item) for item in row] for row in m], float)
+            return np.linalg.inv(matrix).tolist()
+        except (TypeError, ValueError, np.linalg.LinAlgError):
+            raise ScriptError("inv: expected a pose, or a square matrix that has an inverse") from None
 
     def pose_add(self, p_1: Any, p_2: Any) -> Pose:
         """Positions added, rotations composed: R = R1 R2."""

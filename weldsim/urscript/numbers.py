@@ -70,6 +70,17 @@ class NumberFunctions:
             raise ScriptError("get_list_length: expected a list")
         return len(v)
 
+    def size(self, v: Any) -> Any:
+        """The length of a list or text; rows and columns of a matrix."""
+        rows = _rows(v)
+        return self.get_list_length(v) if rows is None else [len(rows), len(rows[0])]
+
+    def transpose(self, m: Any) -> list[list[float]]:
+        """The matrix with its rows as columns."""
+        if (rows := _rows(m)) is None:
+            raise ScriptError("transpose: expected a matrix [[1, 2], [3, 4]]")
+        return [list(column) for column in zip(*rows, strict=True)]
+
     def integer_to_binary_list(self, x: int) -> list[bool]:
         """The 32 bits of x, the least significant first."""
         return [bool(int(number(x)) >> k & 1) for k in range(32)]
@@ -77,3 +88,10 @@ class NumberFunctions:
     def binary_list_to_integer(self, v: Any) -> int:
         """The inverse of `integer_to_binary_list`."""
         return sum(1 << k for k, bit in enumerate(v) if bit)
+
+
+def _rows(value: Any) -> list[list[float]] | None:
+    """The rows of a matrix, all of one length; None of anything else."""
+    if not isinstance(value, list) or not value or not all(isinstance(row, list) and row for row in value):
+        return None
+    return value if len({len(row) for row in value}) == 1 else None

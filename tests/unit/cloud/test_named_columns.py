@@ -79,7 +79,7 @@ def test_names_that_are_not_understood_are_refused_with_all_of_them_and_renaming
 def test_a_unit_in_the_names_is_believed_and_contradicted_in_one_line(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", "x [mm],y [mm],z [mm]", [X * 1e3, Y * 1e3, Z * 1e3])
     np.testing.assert_allclose(read_cloud(path, unit="mm").points, POINTS, atol=1e-6)
-    with pytest.raises(CloudError, match="--units cm, but its columns are named in mm; leave --units out"):
+    with pytest.raises(CloudError, match="--units cm, but its header says mm; leave --units out"):
         read_cloud(path, unit="cm")
     np.testing.assert_allclose(read_cloud(path).points, POINTS, atol=1e-6)
     with pytest.raises(CloudFileError, match=r"its column 'x \[deg\]' is in deg; lengths are in m, cm, mm or in"):

@@ -59,3 +59,51 @@ def test_what_makes_no_sense_ends_the_program(code):
     run_program(machine, f"def job():\n x = 1\n {code}\n write_output_integer_register(0, 9)\nend\n")
     assert machine.io.out_int[0] == 0
     assert "failed" in machine.log[-1][1]
+
+
+def test_a_function_that_an_e_series_alone_has_is_refused_with_the_option_that_works():
+    program = "def job():\n set_tool_communication(False, 115200, 0, 1, 1.5, 3.5)\n write_output_integer_register(0, 7)\nend\n"
+    old, new = new_machine("cb3"), new_machine("e")
+    assert not old.upload(program)
+    assert old.log[-1][1].endswith(
+        "no function 'set_tool_communication'; an e-Series has it: start the controller with --profile e"
+    )
+    run_program(new, program)
+    assert new.io.out_int[0] == 7
+    assert not old.upload("def job():\n set_tool_conversation()\nend\n")
+    assert old.log[-1][1].endswith("no function 'set_tool_conversation'")
+
+
+@pytest.mark.parametrize("series", ["cb3", "e"])
+def test_the_tools_feature_is_where_the_tcp_is(series):
+    machine = new_machine(series)
+    run_program(machine, "def job():\n write_output_float_register(0, point_dist(tool_pose(), get_target_tcp_pose()))\nend\n")
+    assert machine.io.out_double[0] == 0
+    assert not [text for _, text in machine.log if "failed" in text or "refused" in text]
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("size([[1, 2, 3], [4, 5, 6]])[1]", 3),
+        ("size([1, 2, 3])", 3),
+        ('size("weld")', 4),
+        ("transpose([[1, 2, 3], [4, 5, 6]])[2, 1]", 6),
+        ("floor(inv([[2, 0], [0, 0.25]])[1, 1])", 4),
+        ("floor(0.5 + 100 * inv(p[0, 0, 0.25, 0, 3.14159265, 0])[2])", 25),
+    ],
+)
+def test_matrices(code, expected):
+    machine = new_machine("e")
+    run_program(machine, f"def job():\n write_output_integer_register(0, {code})\nend\n")
+    assert machine.io.out_int[0] == expected, machine.log[-1:]
+
+
+@pytest.mark.parametrize(
+    "code", ["transpose([1, 2])", "inv([[1, 2], [2, 4]])", "inv([[1, 2, 3]])", "inv(3)", "transpose([[1], [2, 3]])"]
+)
+def test_what_is_no_matrix_ends_the_program(code):
+    machine = new_machine("e")
+    run_program(machine, f"def job():\n x = {code}\n write_output_integer_register(0, 9)\nend\n")
+    assert machine.io.out_int[0] == 0
+    assert "expected" in machine.log[-1][1]

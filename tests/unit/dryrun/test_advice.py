@@ -40,11 +40,11 @@ def test_a_program_that_asks_where_the_arm_is(tmp_path, says, wrong, right) -> N
     assert len(read_program(file).motions) == 3
 
 
-@pytest.mark.parametrize("moving", ["movec({0}, {0})", "speedl([0, 0, 0.1, 0, 0, 0])", "servoc({0})"])
+@pytest.mark.parametrize("moving", ["optimovel({0})", "speedl([0, 0, 0.1, 0, 0, 0])", "servoc({0})"])
 def test_motions_that_are_not_checked_in_another_way(tmp_path, moving) -> None:
     file = tmp_path / "job.script"
     file.write_text(f"movej({HOME_TEXT})\n{moving.format(POSE)}\n")
-    with pytest.raises(InputError, match="its motion is not checked; use movej, movel, movep or servoj"):
+    with pytest.raises(InputError, match="its motion is not checked; use movej, movel, movep, movec or servoj"):
         read_program(file)
     for name in ("movej", "movel", "movep", "servoj"):
         file.write_text(f"movej({HOME_TEXT})\n{name}({POSE})\n")

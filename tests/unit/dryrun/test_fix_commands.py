@@ -51,6 +51,30 @@ def test_every_fix_passes_with_its_options(middle, options, kinds, tmp_path, cap
         assert dry(capsys, str(file), *options, "--no-fix", *how)["passed"], fix
 
 
+@pytest.mark.parametrize(("second", "broken"), [((0.0, -1.15, 0.05), False), ((0.0, -0.16, 0.05), True)])
+def test_a_fix_of_one_seam_is_tried_on_the_others_of_its_file(second, broken, tmp_path, capsys) -> None:
+    """An option changes every seam: where it helps one and harms another, that is told, and it is true."""
+    rows = ["# torch", "seam,x,y,z,rx,ry,rz"]
+    for name, middle in (("far", (0.0, -1.25, 0.05)), ("near", second)):
+        X_BT = torch_path(flat_curve("line", 0.04) + np.array(middle), DOWN).X_BT
+        table = np.concatenate([X_BT.p, X_BT.rotation_vector], axis=1)
+        rows += [f"{name},{','.join(f'{value:.9f}' for value in row)}" for row in table]
+    file = tmp_path / "job.csv"
+    file.write_text("\n".join(rows))
+    found = dry(capsys, str(file), "--roll")
+    fixes = found["trials"][0]["fixes"]
+    moves = [fix for fix in fixes if fix["kind"] == "move the part"]
+    assert moves
+    for fix in moves:
+        assert (fix["breaks"] == ["near"]) == broken
+        after = dry(capsys, str(file), "--roll", "--no-fix", *shlex.split(fix["how"]))
+        assert [trial["passed"] for trial in after["trials"]] == [True, not broken]
+    main(["dry-run", str(file), "--roll"])
+    said = capsys.readouterr().out
+    assert ("far alone would pass: move the part" in said) == broken
+    assert ("; near would fail with it" in said) == broken
+
+
 @pytest.mark.parametrize("turned", [(), ("--turn", "35 deg")])
 def test_a_fix_of_a_leaned_torch_takes_the_place_of_that_option(turned, tmp_path, capsys) -> None:
     """The option that is told holds what was given and what is added: it is the whole of the change that was checked."""

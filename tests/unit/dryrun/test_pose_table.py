@@ -74,3 +74,16 @@ def test_what_leaves_a_pose_open_is_refused_in_one_line(text: str, words: str) -
     with pytest.raises(InputError, match=f"^a.csv: .*{words}") as caught:
         read_poses(text, "a.csv")
     assert "\n" not in str(caught.value)
+
+
+def test_a_recorded_trajectory_names_its_columns_in_a_comment_and_its_frames_between_them() -> None:
+    rows = [f"{0.1 * i:.1f} base 0.{i} -0.45 0.1 0.0 1.0 0.0 0.0" for i in range(1, 4)]
+    table = read_poses("\n".join(["# timestamp frame_id tx ty tz qx qy qz qw", *rows]), "path.csv")
+    np.testing.assert_allclose(table.poses[:, 0], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(np.abs(table.poses[:, 4]), np.pi)
+
+
+def test_marks_between_thousands_in_a_table_of_poses() -> None:
+    rows = ["-100,5;-1.050,25;100,0;0,0;3,14;0,0", "100,5;-1.050,25;100,0;0,0;3,14;0,0"]
+    table = read_poses("\n".join(["x [mm];y [mm];z [mm];rx;ry;rz", *rows]), "path.csv")
+    np.testing.assert_allclose(table.poses[0], [-0.1005, -1.05025, 0.1, 0.0, 3.14, 0.0])

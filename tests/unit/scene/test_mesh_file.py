@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -233,4 +234,58 @@ def test_an_stl_that_is_cut_off_is_called_that_and_bytes_after_it_are_passed_ove
     is_the_plate(read_mesh_file(path))
     path.write_bytes(whole[:-60])
     with pytest.raises(SceneError, match=rf"promises {len(FACES)} facets, the file holds {len(FACES) - 2}: cut off"):
+        read_mesh_file(path)
+
+
+def parted(count: int, off: float, each: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """The plate with `each` new vertices on an edge of `count` facets, of one side of the edge alone, `off` [rms mm] beside it."""
+    rng = np.random.default_rng(count)
+    corners, faces = list(CORNERS), FACES.tolist()
+    for _ in range(count):
+        a, b, c = faces.pop(int(rng.integers(len(faces))))
+        chain = [a]
+        for share in np.sort(rng.uniform(0.2, 0.8, each)):
+            corners.append(corners[a] + share * (corners[b] - corners[a]) + off * rng.normal(size=3))
+            chain.append(len(corners) - 1)
+        faces += [[first, second, c] for first, second in pairwise([*chain, b])]
+    return np.array(corners), np.array(faces)
+
+
+@pytest.mark.parametrize(("count", "each"), [(1, 1), (3, 3), (10, 2), (40, 1)])
+def test_vertices_on_edges_of_other_facets_part_these_and_that_is_told(tmp_path: Path, count: int, each: int) -> None:
+    read = read_mesh_file(stl(tmp_path / "a.stl", *parted(count, 0.0, each)))
+    is_the_plate(read)
+    which = "1 vertex" if count == 1 else f"{count * each} vertices"
+    assert read.notes == (f"a.stl: {which} on edges of other facets: these facets were parted there",)
+
+
+def test_gaps_up_to_a_thousandth_of_the_part_are_stitched_and_told_and_wider_ones_are_not(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    for width in (0.002, 0.02, 0.1):
+        apart = CORNERS[FACES].reshape(-1, 3) + rng.uniform(-width, width, (72, 3))
+        for corners, faces in ((apart, np.arange(72).reshape(-1, 3)), parted(10, width / 3)):
+            read = read_mesh_file(stl(tmp_path / "a.stl", corners, faces))
+            assert as_mesh(read).volume == pytest.approx(VOLUME, rel=0.05 * width)
+            (note,) = read.notes
+            gap = float(note.partition("gaps of up to ")[2].split()[0])
+            assert 0.3 * width < gap < 4 * width
+    apart = CORNERS[FACES].reshape(-1, 3) + rng.uniform(-2.0, 2.0, (72, 3))
+    with pytest.raises(SceneError, match=r"72 have one face only.*export it as a solid"):
+        read_mesh_file(stl(tmp_path / "a.stl", apart, np.arange(72).reshape(-1, 3)))
+
+
+def test_a_hole_with_a_fine_border_is_not_stitched(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(5, 100.0)  # edges of 3 to 4 mm
+    kept = np.linalg.norm(ball.triangles_center - [0, 0, 100], axis=1) > 8.0
+    with pytest.raises(SceneError, match="have one face only"):
+        read_mesh_file(stl(tmp_path / "a.stl", np.array(ball.vertices), np.array(ball.faces)[kept]))
+    fine = np.array(ball.vertices)
+    fine[np.linalg.norm(fine - [0, 0, 100], axis=1) < 12.0, :2] *= 0.03  # edges shorter than gaps that are stitched, along a hole
+    with pytest.raises(SceneError, match="have one face only"):
+        read_mesh_file(stl(tmp_path / "a.stl", fine, np.array(ball.faces)[kept]))
+
+
+def test_a_surface_without_thickness_is_called_that(tmp_path: Path) -> None:
+    path = stl(tmp_path / "a.stl", CORNERS, FACES[:6])
+    with pytest.raises(SceneError, match="a surface without thickness is no part: export it as a solid"):
         read_mesh_file(path)

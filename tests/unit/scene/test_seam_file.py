@@ -102,3 +102,22 @@ def test_a_column_that_counts_the_rows_is_not_taken_for_x_and_naming_it_helps(tm
         read_seam_file(tmp_path / "s.csv", 1e-3)
     (tmp_path / "s.csv").write_text("\n".join(["id,x,y,z", *rows]))
     np.testing.assert_allclose(read_seam_file(tmp_path / "s.csv", 1e-3).points[0], [-0.115, 0, 0.02])
+
+
+def test_rotation_vectors_after_the_points_are_not_taken_for_normals_and_the_advice_works(tmp_path: Path) -> None:
+    poses = np.hstack([POINTS, np.tile([0.0, 3.1416, 0.0], (3, 1))])
+    with pytest.raises(SceneError, match=r"no unit normals \(length 3.14\), rotation vectors perhaps: leave them out, or name"):
+        read(tmp_path / "s.csv", rows(poses, ","))
+    np.testing.assert_allclose(read(tmp_path / "s.csv", rows(poses[:, :3], ",")).points, POINTS * 1e-3)
+    long = np.hstack([POINTS, 20 * NORMALS])
+    np.testing.assert_allclose(read(tmp_path / "s.csv", "x,y,z,nx,ny,nz\n" + rows(long, ",")).normals, 20 * NORMALS)
+
+
+def test_a_unit_in_a_comment_brackets_and_marks_between_thousands(tmp_path: Path) -> None:
+    for text in (
+        "# units: m\n" + "\n".join(",".join(f"{value:.6f}" for value in row) for row in POINTS * 1e-3),
+        "\n".join(str(row.tolist()) for row in POINTS),
+        "\n".join(str(tuple(map(float, row))) + "," for row in POINTS),
+        "x [um];y [um];z [um]\n" + "\n".join(["-115.000,0;0,0;20.500,0", "0,0;500,0;20.000,0", "115.000,0;1.250,0;19.500,0"]),
+    ):
+        np.testing.assert_allclose(read(tmp_path / "s.csv", text).points, POINTS * 1e-3, atol=1e-12)

@@ -39,6 +39,11 @@ E_ONLY = frozenset(
 """Functions that a CB3 controller does not have."""
 
 
+def elsewhere(machine: Machine) -> frozenset[str]:
+    """Functions that an e-Series has and this controller has not."""
+    return frozenset() if machine.profile.series == "e" else E_ONLY
+
+
 def builtins(machine: Machine) -> dict[str, Callable]:
     """{name: function} for programs on this controller; those that take time are generator functions."""
     groups = (

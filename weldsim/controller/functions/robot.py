@@ -46,6 +46,10 @@ class RobotFunctions:
     def get_target_tcp_pose(self) -> Pose:
         return Pose(self._machine.kinematics.tcp_pose(self._machine.reference.q, self._machine.tool.tcp_matrix))
 
+    def tool_pose(self) -> Pose:
+        """As PolyScope writes the tool's feature."""
+        return self.get_target_tcp_pose()
+
     def get_target_waypoint(self) -> Pose:
         """Where the move that is under way will end; the target pose of now without one."""
         waypoint = self._machine.waypoint

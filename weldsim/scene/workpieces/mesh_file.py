@@ -3,6 +3,7 @@
 import io
 import re
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ from weldsim.errors import SceneError
 from weldsim.scene.workpieces.ply_faces import read_ply_mesh
 from weldsim.scene.workpieces.polygons import triangulated
 from weldsim.scene.workpieces.shells import Broken, Shells, outward
+from weldsim.scene.workpieces.stitches import stitched
 
 SUFFIXES = (".stl", ".obj", ".ply")
 MOST_FACES = 200_000
 SAME_PLACE = 1e-6  # of the part's longest side: vertices nearer to one another are one, where exact places leave it open
+GAPS = (SAME_PLACE, 1e-5, 1e-4, 1e-3)  # of the part's longest side, one after the other: gaps so wide are stitched
 _STL_HEAD = 84  # bytes before the facets of a binary STL, the last four of them their number
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _OBJ = re.compile(rb"^v[ \t]+[-+.\d]", re.MULTILINE)
@@ -79,21 +82,22 @@ def read_mesh_file(path: Path) -> MeshFile:
 
 def _closed(vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]) -> tuple[Float[ndarray, "w 3"], Shells]:
     """The surface by as few changes as close it: none, vertices merged by place, facets that are there twice left out, walls
-    between bodies left out, places rounded.
+    between bodies left out, places rounded, facets parted where others' vertices lie on their edges, gaps stitched.
 
     Raises:
         Broken: none of them does; the reason is that of the merged surface.
     """
-    merged = _merged(vertices, faces)
+    merged, size = _merged(vertices, faces), float(np.ptp(vertices, axis=0).max())
     reason = None
-    for change, note in (
-        (lambda: (vertices, faces), ""),
-        (lambda: merged, ""),
-        (lambda: _once(*merged), "facets that were there twice: left out once"),
-        (lambda: _without_walls(*merged), ""),
-        (lambda: _merged(*merged, SAME_PLACE * float(np.ptp(vertices, axis=0).max())), ""),
+    for change in (
+        lambda: (vertices, faces, ""),
+        lambda: (*merged, ""),
+        lambda: (*_once(*merged), "facets that were there twice: left out once"),
+        lambda: (*_without_walls(*merged), ""),
+        lambda: (*_merged(*merged, SAME_PLACE * size), ""),
+        *(partial(_stitched, *merged, share * size) for share in GAPS),
     ):
-        changed, kept = change()
+        changed, kept, note = change()
         if len(kept) == 0:
             continue
         try:
@@ -103,6 +107,20 @@ def _closed(vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]) -> tupl
             continue
         return changed, Shells(shells.faces, (note, *shells.notes) if note else shells.notes)
     raise reason or Broken("holds no triangles")
+
+
+def _stitched(
+    vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"], tolerance: float
+) -> tuple[Float[ndarray, "w 3"], Int[ndarray, "g 3"], str]:
+    """With its borders stitched, and what was done for people."""
+    found = stitched(vertices, faces, tolerance)
+    done = []
+    if found.parted:
+        one = found.parted == 1
+        done.append(f"{found.parted} {'vertex' if one else 'vertices'} on edges of other facets: these facets were parted there")
+    if found.gap > SAME_PLACE * float(np.ptp(vertices, axis=0).max()):
+        done.append(f"gaps of up to {found.gap:.2g} of its unit between facets: closed")
+    return found.vertices, found.faces, "; ".join(done)
 
 
 def _once(vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"]) -> tuple[Float[ndarray, "v 3"], Int[ndarray, "g 3"]]:

@@ -1,5 +1,6 @@
 """The seam of one's own part: a text file of points on the groove's opening, in order."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,12 +8,28 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.columns import AXES, NORMALS, UNITS, ColumnName, TextTable, by_role, counts, decode, find_table, is_comment, is_number
+from weldsim.columns import (
+    AXES,
+    NORMALS,
+    UNITS,
+    ColumnName,
+    TextTable,
+    by_role,
+    counts,
+    decode,
+    find_table,
+    is_comment,
+    is_number,
+    unit_of_comments,
+    without_thousands,
+)
 from weldsim.errors import SceneError
 
 COLUMNS = (*AXES, *NORMALS, "width")
 UNNAMED = {3: AXES, 4: (*AXES, "width"), 6: COLUMNS[:6], 7: COLUMNS}
 MOST = 100_000  # lines
+_BRACKETED = re.compile(r"^\s*[\[({]+([-+.\d\s,;eE]+)[\])}]+\s*[,;]?\s*$")  # a point as Python and others print it
+UNIT_LENGTH = 0.25  # by which normals without names may be off 1: rotation vectors look like them
 WANTED = "wanted are x, y, z, and perhaps nx, ny, nz and width"
 
 
@@ -48,7 +65,8 @@ def read_seam_file(path: Path, scale: float) -> SeamFile:
     if table is None:
         _refuse_names(path, lines)
         raise SceneError(f"{path}: no points; a seam needs two, x, y, z on each line", path=str(path))
-    column, scales = _columns(path, table, scale)
+    unit = unit_of_comments(lines[: table.first])
+    column, scales = _columns(path, table, scale if unit is None else UNITS[unit])
     rows = [_row(path, number, line, table, column) for number, line in enumerate(lines[table.first :], table.first + 1)]
     numbers = np.array([row for row in rows if row is not None])
     points = np.stack([numbers[:, i] * scales[name] for i, name in enumerate(column) if name in AXES], axis=1)
@@ -71,6 +89,15 @@ def read_seam_file(path: Path, scale: float) -> SeamFile:
     width = values["width"] * scales["width"] if "width" in values else None
     if width is not None and not (width > 0).all():
         raise SceneError(f"{path}: a width is not positive", path=str(path), key="width")
+    if normals is not None and table.names is None and len(column) == 6:
+        length = np.linalg.norm(normals, axis=1)
+        if (worst := float(length[np.abs(length - 1.0).argmax()])) and abs(worst - 1.0) > UNIT_LENGTH:
+            raise SceneError(
+                f"{path}: the last three columns are no unit normals (length {worst:.3g}), rotation vectors perhaps: leave them"
+                " out, or name the columns x,y,z,nx,ny,nz in a first line where they are normals",
+                path=str(path),
+                key="nx",
+            )
     return SeamFile(points=points, normals=normals, width=width)
 
 
@@ -85,7 +112,7 @@ def _lines(path: Path) -> list[str]:
     text = decode(data)
     if "\0" in text:
         raise SceneError(f"mesh.seam {path}: is no text", path=str(path), key="seam")
-    lines = text.split("\n")
+    lines = [_BRACKETED.sub(r"\1", line) for line in without_thousands(text).split("\n")]
     if len(lines) > MOST:
         raise SceneError(f"mesh.seam {path}: {len(lines)} lines; at most {MOST} are read", path=str(path), limit=MOST)
     return lines

@@ -10,6 +10,9 @@ from numpy import ndarray
 _ASLANT = np.array([0.2163, 0.3817, 0.8986])  # a direction in which no part has edges
 
 
+SHEET = 0.3  # of the edges with one face only: more than holes make
+
+
 class Broken(ValueError):  # noqa: N818 - a reason, turned into SceneError by whoever knows the file
     """Why triangles are no closed surface, in one clause."""
 
@@ -123,6 +126,8 @@ def _check_closed(vertices: Float[ndarray, "v 3"], faces: Int[ndarray, "f 3"], b
     single = int((number == 1).sum())
     what = f"{single} have one face only" if single else f"{int(wrong.sum())} have more than two faces of one body"
     remedy = "close it (fill holes) where it was made" if single else "leave out what lies inside it or twice where it was made"
+    if single > SHEET * len(number):
+        remedy = "a surface without thickness is no part: export it as a solid"
     raise Broken(f"is not closed: of its {len(number)} edges {what}, the first at ({x:.6g}, {y:.6g}, {z:.6g}); {remedy}")
 
 
