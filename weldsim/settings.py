@@ -17,6 +17,17 @@ from weldsim.errors import ConfigError
 ALIKE = 0.75  # from which likeness on a word counts as a misspelt other one
 ALIKE_PART = 0.6  # the same for the table and the name of a dotted key, each
 
+MEANT_NAMES = {
+    **dict.fromkeys(("rotation", "rot", "rz", "turn", "heading", "theta"), "yaw"),
+    **dict.fromkeys(("pitch", "roll", "rx", "ry", "slope", "lean"), "tilt"),
+    **dict.fromkeys(("height", "elevation"), "z"),
+    **dict.fromkeys(("velocity", "feed", "feedrate", "travel_speed"), "speed"),
+    **dict.fromkeys(("diameter", "bend"), "radius"),
+    **dict.fromkeys(("thick",), "thickness"),
+    **dict.fromkeys(("stickout", "stick_out", "standoff"), "ctwd"),
+}
+"""What people say for the name of a setting, in a table that has it."""
+
 
 @dataclass(frozen=True)
 class Source:
@@ -126,8 +137,11 @@ def meant_keys(key: str, known: Iterable[str]) -> list[str]:
 def _alike(key: str, known: Iterable[str]) -> list[str]:
     """The dotted key of which both tables and name are a misspelling, if any."""
     table, _, name = key.rpartition(".")
-    scored = []
-    for one in known:
+    scored, known = [], list(known)
+    inside = [one for one in known if one.rpartition(".")[0] == table]
+    if said := [one for one in inside if one.rpartition(".")[2] == MEANT_NAMES.get(name.lower())]:
+        return said
+    for one in inside or known:  # a table that there is was meant
         its_table, _, its_name = one.rpartition(".")
         likeness = [SequenceMatcher(None, *pair).ratio() for pair in ((name, its_name), (table, its_table)) if any(pair)]
         if min(likeness) >= ALIKE_PART:

@@ -178,6 +178,9 @@ def test_a_value_is_written_as_it_is_read(key):
         ("scene.yaw=1", "scene.pose.yaw"),
         ("profile.min_width=5 mm", "seam.profile.min_width"),
         ("mean=0.1 mm", "report.mean or scene.limits.mean"),
+        ("scene.pose.pitch=0.1", "scene.pose.tilt"),
+        ("scene.pose.rotation=0.1", "scene.pose.yaw"),
+        ("path.velocity=6 mm/s", "path.speed"),
     ],
 )
 def test_an_unknown_setting_is_told_with_the_one_meant_and_that_one_works(setting, meant, capsys):

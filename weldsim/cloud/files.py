@@ -24,7 +24,7 @@ from weldsim.cloud.raw import RawCloud, Unreadable
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
 from weldsim.columns import decode
-from weldsim.errors import CloudError, CloudFileError, OutputError
+from weldsim.errors import CloudError, CloudFileError, InputError, OutputError
 from weldsim.output import write_whole
 from weldsim.records import PointCloud
 
@@ -187,12 +187,21 @@ def _breadth(points: Float[ndarray, "n 3"]) -> float:
     return float(np.sqrt(max(0.0, np.linalg.eigvalsh(centred.T @ centred / len(points))[1])))
 
 
-def write_cloud(path: str | Path, cloud: PointCloud) -> Path:
+def write_cloud(path: str | Path, cloud: PointCloud | Float[ndarray, "n 3"]) -> Path:
     """Where the cloud now lies: binary PLY (coordinates in double), NPZ (exact, with all viewpoints) or XYZ text (to 1 nm).
 
+    Args:
+        cloud: or its points [m].
     Raises:
         OutputError: a suffix other than .ply, .npz, .xyz, .txt, or a place that cannot be written.
+        InputError: what is neither a cloud nor an array.  RecordError: an array that is no cloud.
     """
+    if isinstance(cloud, ndarray):
+        cloud = PointCloud(points=cloud)
+    if not isinstance(path, str | Path) or not isinstance(cloud, PointCloud):
+        raise InputError(
+            f"write_cloud: a file name and a cloud, in this order, are wanted, not {type(path).__name__}, {type(cloud).__name__}"
+        )
     writers = {".ply": _ply_bytes, ".npz": _npz_bytes, ".xyz": _xyz_bytes, ".txt": _xyz_bytes}
     suffix = Path(path).suffix.lower()
     if suffix not in writers:
