@@ -4,6 +4,7 @@ Imports nothing heavy: commands that only look at a file's title read it here.
 """
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
@@ -60,8 +61,23 @@ def load_toml(path: str | Path) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})", path=str(path)) from None
     except (UnicodeDecodeError, ValueError, RecursionError) as error:
-        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
+        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else f"{error}{_quoted(Path(path), str(error))}"
         raise ConfigError(f"{path}: no TOML: {reason}", path=str(path)) from None
+
+
+def _quoted(path: Path, reason: str) -> str:
+    """How the line that is no TOML is written, where quotes about its value make it one; else nothing."""
+    match = re.search(r"at line (\d+)", reason)
+    lines = path.read_text(errors="replace").splitlines()
+    if match is None or not 1 <= int(match[1]) <= len(lines):
+        return ""
+    key, equals, value = (part.strip() for part in lines[int(match[1]) - 1].partition("="))
+    line = f'{key} = "{value.strip(chr(34) + chr(39))}"'
+    try:
+        tomllib.loads(line)
+    except ValueError:
+        return ""
+    return f"; write {line}" if equals and value else ""
 
 
 def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:

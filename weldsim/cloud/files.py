@@ -63,7 +63,8 @@ def read_cloud(
         with np.errstate(all="ignore"):  # signalling NaNs and the like are dropped below
             raw = _reader(data)(data)
     except Unreadable as error:
-        raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
+        reason = _of_another_kind(Path(path)) or str(error)
+        raise CloudFileError(f"{path}: {reason}", path=str(path), reason=reason) from None
     said = unit or raw.unit or "m"
     if raw.unit is not None and said != raw.unit:
         raise CloudError(f"{path}: --units {said}, but its columns are named in {raw.unit}; leave --units out", path=str(path))
@@ -90,6 +91,17 @@ def read_cloud(
         viewpoints=viewpoints,
         view=None if view is None else view[keep],
     )
+
+
+def _of_another_kind(path: Path) -> str:
+    """What a file that is no cloud is by its name, and what to do with it; "" for a cloud's name."""
+    kinds = {
+        ".toml": f"it is no cloud; of a scene, weldsim scan {path} --out {path.stem}.ply makes one",
+        ".json": f"it is no cloud; of a path, did you mean weldsim dry-run {path}?",
+        ".script": f"it is a robot program, no cloud; did you mean weldsim dry-run {path}?",
+        ".stl": "it is an STL mesh, no cloud; a scene with it under [mesh] can be scanned: weldsim scan SCENE.toml --out cloud.ply",
+    }
+    return kinds.get(path.suffix.lower(), "")
 
 
 def _reader(data: bytes) -> Callable[[bytes], RawCloud]:

@@ -309,3 +309,30 @@ def test_help_is_a_command_too(capsys):
 @pytest.mark.parametrize(("words", "seam"), [("plan a.ply --seam all", "all"), ("plan a.ply --seam 2", 2), ("plan a.ply", None)])
 def test_all_seams_may_be_asked_for_by_name(words, seam):
     assert parse(words.split()).seam == seam  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("run curve.toml", "did you mean curve, which comes with weldsim?"),
+        ("run job", "job is a run directory, no scene; did you mean weldsim dry-run job/path.json?"),
+        ("run empty", "empty is a folder, no scene"),
+        ("plan mine.toml", "it is no cloud; of a scene, weldsim scan mine.toml --out mine.ply makes one"),
+        ("plan part.stl", "it is an STL mesh, no cloud"),
+        ("plan job/path.json", "did you mean weldsim dry-run job/path.json?"),
+        ("plan robot.script", "it is a robot program, no cloud; did you mean weldsim dry-run robot.script?"),
+    ],
+)
+def test_a_file_of_another_kind_is_called_that(line, says, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("job", "empty"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "job" / "path.json").write_text('{"schema": "weldsim.path/1"}')
+    (tmp_path / "mine.toml").write_text('workpiece = "cuboid"\n')
+    (tmp_path / "part.stl").write_bytes(bytes(200))
+    (tmp_path / "robot.script").write_text("def p():\nend\n")
+    said = answer(shlex.split(line), capsys)
+    assert says in said
+    meant = re.search(r"(?:did you mean |of a scene, )(weldsim [^?;]*?)(?:\?| makes)", said)
+    if meant:
+        assert callable(parse(shlex.split(meant[1])[1:]))

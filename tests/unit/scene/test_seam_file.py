@@ -102,3 +102,9 @@ def test_a_column_that_counts_the_rows_is_not_taken_for_x_and_naming_it_helps(tm
         read_seam_file(tmp_path / "s.csv", 1e-3)
     (tmp_path / "s.csv").write_text("\n".join(["id,x,y,z", *rows]))
     np.testing.assert_allclose(read_seam_file(tmp_path / "s.csv", 1e-3).points[0], [-0.115, 0, 0.02])
+
+
+def test_a_column_that_tells_lines_apart_is_named_and_without_it_the_file_is_read(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"column 'Seam' tells lines apart; a part has one seam"):
+        read(tmp_path / "a.csv", "x,y,z,Seam\n0,0,0,1\n1,0,0,1\n0,1,0,2\n1,1,0,2\n")
+    assert len(read(tmp_path / "a.csv", "x,y,z\n0,0,0\n1,0,0\n").points) == 2
