@@ -161,7 +161,7 @@ def _refused(
     verdicts = list(_all(path))
     for i, mine in enumerate(_refusals_at(path.s, rail, rungs, cell, config)):
         if mine is not None and path.s[i] >= s_first - 1e-9:
-            verdicts[i] = failing(verdicts[i], Fault(index=i, why=mine.why, text=mine.text, touch=mine.touch))
+            verdicts[i] = failing(verdicts[i], Fault(index=i, why=mine.why, text=_given(mine.text, rail), touch=mine.touch))
     lead = "" if rail.start <= s_first <= rail.end else f" on the {'lead-in' if s_first < rail.start else 'lead-out'}"
     index = rail.path_index(s_first)
     text = f"s = {1e3 * s_first:.1f} mm{lead}: {_said(refusal.why, refusal.text, refusal.options, rail)}"
@@ -180,6 +180,11 @@ def _refused(
 def _said(why: Why, text: str, options: int, rail: Rail) -> str:
     if why == "collision":
         return f"all {options} postures that reach it touch something, the least deep: {text}"
+    return _given(text, rail)
+
+
+def _given(text: str, rail: Rail) -> str:
+    """A reason as it is where the rotation about the wire is free, or given."""
     return text if rail.roll_free else text.replace("any rotation", "the given rotation")
 
 
