@@ -214,13 +214,15 @@ class Regress(ConfigOptions):
                 print(f"  left {row.folder}")
         for shift in outcome.shifts:
             print(f"  WORSE {shift_sentence(shift)}")
+        if failed := sum(bool(row.fault) for row in outcome.rows):
+            print(f"  FAILED {counted(failed, 'plan')}, by a fault of the finder's own")
         if unjudged(outcome):
             print(f"  {unjudged(outcome)}")
         if not self._judges:
             print(f"  nothing is judged: {path} holds figures of {GOLDEN_SENSOR}, not of {self.sensor}")
         elif not self.update:
             count = len(outcome.deviations) + len(outcome.shifts)
-            worse = "nothing is" if outcome.passed else f"{count} figure{' is' if count == 1 else 's are'}"
+            worse = "nothing is" if not count else f"{count} figure{' is' if count == 1 else 's are'}"
             print(f"  {worse} worse than {path} allows")
         for place in written:
             print(f"  wrote {place}")
