@@ -27,8 +27,9 @@ class Regress(ConfigOptions):
 
     Each scene is scanned once for every seed and planned by both methods; every figure of the plan against the known seam is
     compared with tests/regression/golden.json (in an installed package: weldsim/_data/regression/golden.json). Exits 1 when a
-    figure is worse than its tolerance allows; a better one never fails. A seed that fails leaves its run directory. The
-    published method, whose single seeds are a matter of chance, is judged over all seeds: of 3 or more, against the 40 recorded.
+    figure is worse than its tolerance allows, or a finder of your own fails; a better figure never fails. A seed that fails
+    leaves its run directory. The published method, whose single seeds are a matter of chance, is judged over all seeds: of 3
+    or more, against the 40 recorded.
     """
 
     scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SCENE ...")] = ()
