@@ -21,6 +21,8 @@ STILL = (5e-5, 0.02)  # [m], of the longer steps: nearer waypoints were recorded
 STEP = 0.001  # [m] between the poses of a refitted path
 LEAST = (1e-6, 1e-5)  # [m], [rad] scatter that counts as none
 QUANTILE = 0.35  # of the waypoints' distances: two corners among a dozen waypoints have no say yet
+WEAVE = (24, 0.6)  # waypoints that tell a weave, and the share of the variance at one frequency; of noise a fifth
+EVEN = 0.1  # of the variances of the scatter, the least over the greatest direction's: three axes of noise come to over 0.5
 LENGTHS = (0.9282, 1.2816)  # that share of vectors of two and of three independent standard normal components is shorter
 STRENGTHS = (1e-14, 1e2)  # of smoothing, over arc length in units of the path's own: none and almost a straight line
 
@@ -56,7 +58,7 @@ class Refit:
 def scatter_of(path: TorchPath) -> Scatter:
     """The waypoints' scatter: how far each is from the cubic through the two before and the two after it.
 
-    From the distance that QUANTILE of them keep to: corners and jumps, which are few, have no say.
+    From the distance that QUANTILE of them keep to: corners and jumps, which are few, have no say. A weave is no scatter.
     """
     places = _places(path)
     if len(places) < FEWEST:
@@ -66,10 +68,38 @@ def scatter_of(path: TorchPath) -> Scatter:
     scale = np.sqrt(1.0 + np.sum(weights**2, axis=1))
     out = []
     for values, length in zip((p, 2.0 * q), LENGTHS, strict=True):  # half the turn stands in a quaternion
-        around = np.stack([values[i : len(values) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
-        off = np.linalg.norm(values[2:-2] - np.einsum("ij,ijk->ik", weights, around), axis=1)
+        off_cubic = _off_cubic(values, weights)
+        if _weaves(off_cubic):
+            out.append(0.0)
+            continue
+        off = np.linalg.norm(off_cubic, axis=1)
         out.append(float(np.quantile(off / scale, QUANTILE)) / length)
     return Scatter(position=out[0], rotation=out[1])
+
+
+def is_even(path: TorchPath) -> bool:
+    """Whether the waypoints' places scatter alike in every direction, as noise does, and a weave, which is flat, does not."""
+    p = path.X_BT.p[_places(path)]
+    if len(p) < FEWEST:
+        return False
+    off = _off_cubic(p, _cubic_weights(arc_length(p)))
+    spread = np.linalg.eigvalsh(off.T @ off)
+    return bool(spread[0] > EVEN * spread[-1])
+
+
+def _weaves(off: Float[ndarray, "m d"]) -> bool:
+    """Whether the distances from a smooth curve come and go at one frequency, as a weave's do: noise has them all."""
+    power = np.sum(np.abs(np.fft.rfft(off - off.mean(axis=0), axis=0)[1:]) ** 2, axis=1)
+    if len(off) < WEAVE[0] or power.sum() <= 0:
+        return False
+    line = int(power.argmax())
+    return bool(power[max(line - 1, 0) : line + 2].sum() > WEAVE[1] * power.sum())
+
+
+def _off_cubic(values: Float[ndarray, "n d"], weights: Float[ndarray, "m 4"]) -> Float[ndarray, "m d"]:
+    """Each value, but for two at both ends, from what the two before and the two after it make it."""
+    around = np.stack([values[i : len(values) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
+    return values[2:-2] - np.einsum("ij,ijk->ik", weights, around)
 
 
 def refit(path: TorchPath, scatter: Scatter, share: float = 1.0) -> Refit:

@@ -7,7 +7,7 @@ import numpy as np
 
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.path_faults import FASTEST, path_faults
-from weldsim.dryrun.scatter import Refit, Scatter, nearest_in_order, refit, scatter_of
+from weldsim.dryrun.scatter import Refit, Scatter, is_even, nearest_in_order, refit, scatter_of
 from weldsim.dryrun.sections import with_every_failure
 from weldsim.dryrun.try_path import try_path
 from weldsim.dryrun.verdict import Trial, Verdict
@@ -63,7 +63,8 @@ def try_waypoints(path: TorchPath, name: str, cell: Cell, config: MotionConfig) 
 
 def _zigzags(path: TorchPath, scatter: Scatter) -> bool:
     """Whether the way from waypoint to waypoint is mostly their scatter."""
-    return scatter.position > TOLD[0] and scatter.position * (len(path.s) - 1) > ZIGZAG * float(path.s[-1] - path.s[0])
+    dense = scatter.position * (len(path.s) - 1) > ZIGZAG * float(path.s[-1] - path.s[0])
+    return scatter.position > TOLD[0] and dense and is_even(path)
 
 
 def _worth_refitting(path: TorchPath, trial: Trial) -> bool:

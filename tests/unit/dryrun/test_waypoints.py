@@ -13,7 +13,7 @@ from weldsim.dryrun.cell import Cell, empty_cell
 from weldsim.dryrun.path_faults import turns_back
 from weldsim.dryrun.read import read_program
 from weldsim.dryrun.run import dry_run
-from weldsim.dryrun.scatter import nearest_in_order, refit, scatter_of
+from weldsim.dryrun.scatter import is_even, nearest_in_order, refit, scatter_of
 from weldsim.dryrun.verdict import Trial
 from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.frames import Transform
@@ -182,6 +182,22 @@ def test_travel_that_turns_back_is_called_that_each_time(empty: Cell, scatter) -
     # The advice, followed.
     assert not turns_back(path)
     assert try_waypoints(shuffled(path, list(range(30))), "in order", empty, CONFIG)[1].passed
+
+
+@pytest.mark.parametrize("legs", [1, 2, 3, 8])
+@pytest.mark.parametrize("wide", [5e-4, 3e-3])
+def test_a_weave_is_no_scatter_and_is_not_flattened(empty: Cell, legs, wide) -> None:
+    """Waypoints at its corners, or some on each leg."""
+    u = np.arange(80 * legs + 1) / legs
+    across = wide * (2 * np.abs((u + 0.5) % 2 - 1) - 1)
+    points = np.stack([0.002 * u - 0.08, -0.45 + across, np.full(len(u), 0.1)], axis=1)
+    straight = torch_path(points * [1.0, 0.0, 1.0] + [0.0, -0.45, 0.0], DOWN, speed=0.002)
+    weave = replace(straight, X_BT=Transform("BT", straight.X_BT.R, points), s=arc_length(points), roll_free=False)
+    assert scatter_of(weave).position < 0.15 * wide
+    assert not is_even(weave)
+    if legs == 1:
+        followed, _ = try_waypoints(weave, "weave", empty, CONFIG)
+        assert project(points, followed.X_BT.p)[0].max() < 0.1 * wide
 
 
 @pytest.mark.parametrize("count", [200, 1000, 5000])
