@@ -103,9 +103,12 @@ def _of_spacing(cloud: PointCloud) -> str:
     spacing = _spacing(cloud.points)
     if spacing < THINNED:
         return ""
+    needed = f"one of {WIDEST * 1e3:.0f} mm needs them {WIDEST / ACROSS * 1e3:.1f} mm apart"
+    if spacing <= WIDEST / ACROSS:
+        needed = f"one under {spacing * ACROSS * 1e3:.0f} mm does not"
     return (
-        f"; its points lie {spacing * 1e3:.1f} mm apart, and a groove shows with {ACROSS} across its width: one of"
-        f" {WIDEST * 1e3:.0f} mm needs them {WIDEST / ACROSS * 1e3:.1f} mm apart; thin it less, or scan from nearer"
+        f"; its points lie {spacing * 1e3:.1f} mm apart, and a groove shows with {ACROSS} across its width: {needed};"
+        " thin it less, or scan from nearer"
     )
 
 

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.cloud.deproject import deproject
+from weldsim.cloud.extent import check_extent_of_array
 from weldsim.cloud.files import read_cloud
 from weldsim.config import CellConfig, load_config, load_scene
 from weldsim.errors import CloudError, InputError, WeldsimError
@@ -58,9 +59,14 @@ def _refuse_scene(given: str | Path) -> None:
 
 
 def _points(given: Any) -> Float[ndarray, "n 3"]:
-    """Points (n, 3) from an array (n, 3), or (h, w, 3) of an organised cloud."""
+    """Points (n, 3) from an array (n, 3), or (h, w, 3) of an organised cloud, or one with fields x, y, z."""
     try:
-        points = np.asarray(given, float)
+        given = np.asarray(given)
+        if given.dtype.names is not None and set("xyz") <= set(given.dtype.names):
+            given = np.stack([given[axis] for axis in "xyz"], axis=-1)
+        if given.dtype.kind in "bc":  # truth values and complex numbers would be taken for numbers
+            raise TypeError
+        points = given.astype(float)
     except (TypeError, ValueError):
         raise InputError("plan: what is given is no array of numbers; an (n, 3) array of points in metres is wanted") from None
     if points.ndim == 3 and points.shape[2] == 3:
@@ -73,7 +79,9 @@ def _points(given: Any) -> Float[ndarray, "n 3"]:
     finite = np.isfinite(points).all(axis=1)
     if not finite.any():
         raise CloudError(f"none of the {len(points)} points is finite", total=len(points))
-    return points if finite.all() else points[finite]
+    points = points if finite.all() else points[finite]
+    check_extent_of_array("plan", points)
+    return points
 
 
 def config_from(given: Any) -> CellConfig:
@@ -82,8 +90,14 @@ def config_from(given: Any) -> CellConfig:
         return CellConfig()
     if isinstance(given, CellConfig):
         return given
-    if isinstance(given, str | Path | Mapping):
+    if isinstance(given, Mapping):
+        return load_config(_nested(given))
+    if isinstance(given, str) and "=" in given and not Path(given).exists():
+        return load_config(None, [given])
+    if isinstance(given, str | Path):
         return load_config(given)
+    if isinstance(given, list | tuple) and all(isinstance(one, str) for one in given):
+        return load_config(None, given)
     raise InputError(f"config: {_kind(given)} is none; a CellConfig (weldsim.load_config), its tables or a TOML file is wanted")
 
 
@@ -96,8 +110,41 @@ def scene_from(given: Any) -> "SceneConfig":
     if isinstance(given, str | Path):
         return load_scene(given)
     if isinstance(given, Mapping):
-        return structure(given, SceneConfig, where="scene")
+        return structure(_nested(given), SceneConfig, where="scene")
     raise InputError(f"scene: {_kind(given)} is none; the name of one, a TOML file or a SceneConfig (weldsim.load_scene) is wanted")
+
+
+def _nested(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables in which a dotted key, "path.speed" say, stands for the tables that it names."""
+    out: dict[str, Any] = {}
+    for key, value in tables.items():
+        inner = _nested(value) if isinstance(value, Mapping) else value
+        for part in reversed(str(key).split(".")[1:]):
+            inner = {part: inner}
+        name = str(key).partition(".")[0]
+        both = isinstance(inner, Mapping) and isinstance(out.get(name), dict)
+        out[name] = _merged(out[name], inner) if both else inner
+    return out
+
+
+def _merged(first: dict[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
+    """Two tables as one; of two values the second."""
+    both = {key for key in first.keys() & second.keys() if isinstance(first[key], dict) and isinstance(second[key], Mapping)}
+    return {**first, **second, **{key: _merged(first[key], second[key]) for key in both}}
+
+
+def sighting_from(given: Any) -> Any:
+    """The sighting that is meant. Raises InputError for anything but what `weldsim.look` returns."""
+    if not all(hasattr(given, name) for name in ("world", "cloud", "captures")):
+        raise InputError(f"finish: {_kind(given)} is no sighting; what weldsim.look returned is wanted")
+    return given
+
+
+def result_from(given: Any) -> Any:
+    """The plan that is meant. Raises InputError for anything but what `weldsim.plan` returns."""
+    if not all(hasattr(given, name) for name in ("findings", "paths", "cloud")):
+        raise InputError(f"finish: {_kind(given)} is no plan; what weldsim.plan returned for the sighting's cloud is wanted")
+    return given
 
 
 def findings_from(given: Any, cloud: PointCloud, finder: str) -> SeamFindings:
@@ -115,7 +162,7 @@ def findings_from(given: Any, cloud: PointCloud, finder: str) -> SeamFindings:
     elif isinstance(given, Seam):
         seams = (given,)
     elif isinstance(given, ndarray):
-        seams = (_along(given, finder),)
+        seams = (_along(given, finder),) if len(given) else ()
     elif isinstance(given, Sequence) and not isinstance(given, str):
         seams = tuple(one if isinstance(one, Seam) else _along(one, finder) for one in given)
     else:

@@ -20,7 +20,17 @@ from weldsim.cloud.filters import prepare
 from weldsim.cloud.views import merge_views
 from weldsim.config import CellConfig, digest, limits_for
 from weldsim.errors import ExecutionError, InputError, WeldsimError
-from weldsim.inputs import CloudLike, ConfigLike, SceneLike, cloud_from, config_from, findings_from, scene_from
+from weldsim.inputs import (
+    CloudLike,
+    ConfigLike,
+    SceneLike,
+    cloud_from,
+    config_from,
+    findings_from,
+    result_from,
+    scene_from,
+    sighting_from,
+)
 from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, Weld, pick, seams_to_weld, unplanned
 from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.plan import plan_paths
@@ -202,6 +212,7 @@ def finish(
         MotionError, ExecutionError: the arm cannot.  InputError: a seam number that there is not.
         PathError: the seam that is meant has no path.
     """
+    seen, result = sighting_from(seen), result_from(result)
     config, clock, world = config_from(config), clock or Clock(), seen.world
     meant = seams_to_weld(result, number, near)
     welds = _weld(seen, meant, config, clock, video, black_boxes) if execute and meant else ()

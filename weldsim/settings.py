@@ -4,6 +4,7 @@ Imports nothing heavy: commands that only look at a file's title read it here.
 """
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
@@ -16,6 +17,17 @@ from weldsim.errors import ConfigError
 
 ALIKE = 0.75  # from which likeness on a word counts as a misspelt other one
 ALIKE_PART = 0.6  # the same for the table and the name of a dotted key, each
+
+MEANT_NAMES = {
+    **dict.fromkeys(("rotation", "rot", "rz", "turn", "heading", "theta"), "yaw"),
+    **dict.fromkeys(("pitch", "roll", "rx", "ry", "slope", "lean"), "tilt"),
+    **dict.fromkeys(("height", "elevation"), "z"),
+    **dict.fromkeys(("velocity", "feed", "feedrate", "travel_speed"), "speed"),
+    **dict.fromkeys(("diameter", "bend"), "radius"),
+    **dict.fromkeys(("thick",), "thickness"),
+    **dict.fromkeys(("stickout", "stick_out", "standoff"), "ctwd"),
+}
+"""What people say for the name of a setting, in a table that has it."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +61,23 @@ def load_toml(path: str | Path) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})", path=str(path)) from None
     except (UnicodeDecodeError, ValueError, RecursionError) as error:
-        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
+        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else f"{error}{_quoted(Path(path), str(error))}"
         raise ConfigError(f"{path}: no TOML: {reason}", path=str(path)) from None
+
+
+def _quoted(path: Path, reason: str) -> str:
+    """How the line that is no TOML is written, where quotes about its value make it one; else nothing."""
+    match = re.search(r"at line (\d+)", reason)
+    lines = path.read_text(errors="replace").splitlines()
+    if match is None or not 1 <= int(match[1]) <= len(lines):
+        return ""
+    key, equals, value = (part.strip() for part in lines[int(match[1]) - 1].partition("="))
+    line = f'{key} = "{value.strip(chr(34) + chr(39))}"'
+    try:
+        tomllib.loads(line)
+    except ValueError:
+        return ""
+    return f"; write {line}" if equals and value else ""
 
 
 def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
@@ -126,8 +153,11 @@ def meant_keys(key: str, known: Iterable[str]) -> list[str]:
 def _alike(key: str, known: Iterable[str]) -> list[str]:
     """The dotted key of which both tables and name are a misspelling, if any."""
     table, _, name = key.rpartition(".")
-    scored = []
-    for one in known:
+    scored, known = [], list(known)
+    inside = [one for one in known if one.rpartition(".")[0] == table]
+    if said := [one for one in inside if one.rpartition(".")[2] == MEANT_NAMES.get(name.lower())]:
+        return said
+    for one in inside or known:  # a table that there is was meant
         its_table, _, its_name = one.rpartition(".")
         likeness = [SequenceMatcher(None, *pair).ratio() for pair in ((name, its_name), (table, its_table)) if any(pair)]
         if min(likeness) >= ALIKE_PART:

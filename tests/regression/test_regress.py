@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
@@ -82,6 +83,18 @@ def test_why_a_finder_of_ones_own_gave_nothing_is_said_once_a_reason(outcome):
     ]
     assert refusals(replace(outcome, rows=tuple(rows))) == [f"straight, mine, seeds 0, 2: {said}"]
     assert refusals(outcome) == []
+
+
+@pytest.mark.parametrize(("returned", "code"), [("None", 0), ("1 / 0", 1), ("'line'", 1), ("cloud.points * 1e3", 1)])
+def test_a_finder_that_fails_fails_the_run_and_one_that_finds_nothing_does_not(returned, code, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(f"def find(cloud):\n    return {returned}\n")
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    words = ["regress", "--scenes", "plain", "--methods", "mine.py:find", "--seeds", "1", "--jobs", "1", "--junit", "out.xml"]
+    assert main([*words, "--sensor", "exact"]) == code
+    out = capsys.readouterr().out
+    assert ("FAILED 1 plan, by a fault of the finder's own" in out) is bool(code)
+    assert ('type="FinderFailed"' in (tmp_path / "out.xml").read_text()) is bool(code)
 
 
 def test_figures_do_not_depend_on_processes(outcome):

@@ -36,6 +36,7 @@ class OfAnotherLibrary:
         [tuple(row) for row in POINTS],
         POINTS.reshape(10, 20, 3),
         np.vstack([POINTS, [[np.nan, 0.0, 0.0]]]),
+        np.array([tuple(row) for row in POINTS], dtype=[("x", float), ("y", float), ("z", float)]),
         PointCloud(points=POINTS),
         OfAnotherLibrary(),
     ],
@@ -66,7 +67,9 @@ def test_a_file_and_a_depth_frame_are_clouds(tmp_path):
         (np.zeros((480, 640)), "a depth image needs its camera"),
         ([["a", "b", "c"]], "no array of numbers"),
         (np.full((5, 3), np.nan), "none of the 5 points is finite"),
-        (1e3 * POINTS, "looks like millimetres"),
+        (1e3 * POINTS, "looks like millimetres (times 0.001)"),
+        (POINTS > 0, "no array of numbers"),
+        (POINTS + 0j, "no array of numbers"),
         ("straight", 'weldsim.run("straight"), or weldsim.look("straight").cloud'),
         ("nowhere.ply", "no such file"),
     ],
@@ -91,10 +94,34 @@ def test_settings_may_be_a_file_or_its_tables(tmp_path):
     for given in (file, str(file), {"path": {"speed": "6 mm/s"}}):
         assert config_from(given).path.speed == pytest.approx(0.006)
         assert config_from(given).source("path.speed").kind == "file"
+    for given in ({"path.speed": "6 mm/s"}, "path.speed=6 mm/s", ["path.speed=6 mm/s", "path.step=1 mm"]):
+        assert config_from(given).path.speed == pytest.approx(0.006)
+    both = config_from({"path.speed": "6 mm/s", "path": {"step": "1 mm"}, "seam.profile.min_width": "5 mm"})
+    assert (both.path.speed, both.path.step) == pytest.approx((0.006, 0.001))
+    assert both.seam.profile.min_width == pytest.approx(0.005)
     with pytest.raises(InputError, match="config: an int is none; a CellConfig"):
         weldsim.plan(POINTS, 3)  # type: ignore[arg-type]
     with pytest.raises(WeldsimError, match=r"unknown key 'path\.sped'; did you mean path\.speed"):
         weldsim.plan(POINTS, {"path": {"sped": 1}})
+
+
+def test_what_is_no_sighting_and_no_plan_is_said_with_what_is_wanted():
+    """In a process of its own, without the tests' checker of types, which would see it first."""
+    program = (
+        "import numpy as np, weldsim\n"
+        "P = np.zeros((4, 3))\n"
+        "finish, write = weldsim.finish, weldsim.write_cloud\n"
+        "for call in (lambda: finish('straight', P), lambda: write(P, 'a.ply'), lambda: write('a.ply', None)):\n"
+        "    try:\n        call()\n    except weldsim.WeldsimError as error:\n        print(error)"
+    )
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.splitlines()
+    assert said[0] == "finish: a str is no sighting; what weldsim.look returned is wanted"
+    assert said[1] == "write_cloud: a file name and a cloud, in this order, are wanted, not ndarray, str"
+    assert said[2] == "write_cloud: a file name and a cloud, in this order, are wanted, not str, NoneType"
+
+
+def test_an_array_is_written_as_a_cloud(tmp_path):
+    assert np.array_equal(weldsim.read_cloud(write_cloud(tmp_path / "a.ply", POINTS)).points, POINTS)
 
 
 def test_a_scene_may_be_a_name_a_file_or_its_tables(tmp_path):
@@ -103,6 +130,7 @@ def test_a_scene_may_be_a_name_a_file_or_its_tables(tmp_path):
     assert scene_from("cuboid") == load_scene("cuboid")
     assert scene_from(file).workpiece == scene_from({"workpiece": "cylinder"}).workpiece == "cylinder"
     assert scene_from(load_scene("y")) == load_scene("y")
+    assert scene_from({"groove.width": "10 mm", "groove.depth": "5 mm"}).groove.width == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("call", [weldsim.run, weldsim.look])
@@ -160,6 +188,7 @@ LINE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0]])
     [
         (None, 0),
         ([], 0),
+        (np.zeros((0, 3)), 0),
         (LINE, 1),
         ([LINE, LINE + 0.1], 2),
         (Seam.along(LINE), 1),
@@ -191,6 +220,7 @@ def leaves(cloud: PointCloud) -> SeamFindings:
         (lambda cloud: 7, "returned an int; SeamFindings, a Seam, several, or (n, 3) points are wanted"),
         (lambda cloud: "straight", "returned a str"),
         (lambda cloud: np.zeros((1, 3)), "returned no seam"),
+        (lambda cloud: LINE[[0, 2, 1]], "turns back on itself at point 2"),
         (lambda cloud: SeamFindings(seams=(), region=np.zeros(3, np.int32)), "region has 3 entries, the cloud 200 points"),
     ],
 )
@@ -238,6 +268,8 @@ def test_normals_of_a_seam_stand_across_it():
         ("line", (0, 0, 1), "no array of numbers"),
         ([[0, 0, 0], [0.1, 0, 0]], (0, 1), "normals_B: shape (2,)"),
         ([[0, 0, 0], [100, 0, 0]], (0, 0, 1), "millimetres"),
+        ([[0, 0, 0], [0.1, 0, 0], [0.05, 0, 0]], (0, 0, 1), "turns back on itself at point 2, (0.1000, 0.0000, 0.0000) m"),
+        ([[0, 0, 0], [0.1, 0, 0]], [[0, 0, 0], [0, 0, 1]], "a normal is zero"),
     ],
 )
 def test_what_is_no_seam_is_said(points, normals, says):

@@ -118,6 +118,16 @@ def test_a_thinned_cloud_is_told_the_spacing_and_it_works(scan) -> None:
     assert len(plan(voxel_grid(cloud, 0.0028)).findings.seams) == 1
 
 
+def test_points_near_enough_for_wide_grooves_are_told_which_do_not_show(plain: PointCloud) -> None:
+    """What is asked of the points is never what they have already."""
+    thinned = voxel_grid(plain, 0.0024)
+    told = hint(replace(thinned, viewpoints=np.zeros((0, 3)), view=None), CellConfig())
+    apart, width = (float(told.split(said)[1].split(" mm")[0]) for said in ("its points lie ", "one under "))
+    assert 2.0 <= apart <= 2.8
+    assert width == pytest.approx(5 * apart, abs=0.6)
+    assert "needs them" not in told
+
+
 def test_a_voxel_that_hides_the_groove_is_named_and_leaving_it_out_works(scan) -> None:
     cloud, config = scan[0], CellConfig()
     coarse = replace(config, cloud=replace(config.cloud, voxel=0.0065))

@@ -13,7 +13,7 @@ from weldsim.errors import ConfigError, SceneError
 from weldsim.report.limits import ReportConfig
 from weldsim.scene.config import SceneConfig
 from weldsim.schema import keys
-from weldsim.settings import Source, meant_keys, with_sources
+from weldsim.settings import Source, load_toml, meant_keys, with_sources
 from weldsim.units import parse
 
 GENERAL = ReportConfig()
@@ -178,6 +178,9 @@ def test_a_value_is_written_as_it_is_read(key):
         ("scene.yaw=1", "scene.pose.yaw"),
         ("profile.min_width=5 mm", "seam.profile.min_width"),
         ("mean=0.1 mm", "report.mean or scene.limits.mean"),
+        ("scene.pose.pitch=0.1", "scene.pose.tilt"),
+        ("scene.pose.rotation=0.1", "scene.pose.yaw"),
+        ("path.velocity=6 mm/s", "path.speed"),
     ],
 )
 def test_an_unknown_setting_is_told_with_the_one_meant_and_that_one_works(setting, meant, capsys):
@@ -266,3 +269,22 @@ def test_keys_that_may_be_meant():
     assert meant_keys("groove.width", known) == ["scene.groove.width"]
     assert meant_keys("cell.path.speed", known) == ["path.speed"]
     assert meant_keys("nothing.alike", known) == []
+
+
+@pytest.mark.parametrize("line", ["y = -450 mm", "y = 12mm", "name = part one"])
+def test_a_value_that_wants_quotes_is_told_with_them_and_is_toml_then(line, tmp_path):
+    file = tmp_path / "part.toml"
+    file.write_text(f"[pose]\n{line}\n")
+    with pytest.raises(ConfigError, match="no TOML") as caught:
+        load_toml(file)
+    told = str(caught.value).partition("; write ")[2]
+    file.write_text(f"[pose]\n{told}\n")
+    assert load_toml(file)["pose"][line.partition(" ")[0]] == line.partition("= ")[2].strip("'")
+
+
+def test_what_quotes_do_not_mend_is_not_told_to_want_them(tmp_path):
+    file = tmp_path / "part.toml"
+    file.write_text("[pose\n")
+    with pytest.raises(ConfigError) as caught:
+        load_toml(file)
+    assert "; write" not in str(caught.value)

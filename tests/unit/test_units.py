@@ -28,6 +28,16 @@ from weldsim.errors import ConfigError
         ("2", "m", 2.0),
         (2, "m", 2.0),
         ("3 px", "px", 3.0),
+        ("12 MM", "m", 0.012),
+        ("2.5 millimetres", "m", 0.0025),
+        ("1 foot", "m", 0.3048),
+        ("250 µm", "m", 250e-6),
+        ("45 degrees", "rad", math.pi / 4),
+        ("90 Deg/Sec", "rad/s", math.pi / 2),
+        ("12 ipm", "m/s", 12 * 0.0254 / 60),
+        ("3 seconds", "s", 3.0),
+        ("1,5 mm", "m", 0.0015),
+        ("0,005", "m", 0.005),
     ],
 )
 def test_text_becomes_si(text: str | int, dimension: str, value: float) -> None:
@@ -42,6 +52,22 @@ def test_what_is_no_length_is_refused(value: object) -> None:
     with pytest.raises(ConfigError, match=r"seam\.width") as caught:
         units.parse(value, "m", where="seam.width")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("dimension", sorted(units.DIMENSIONS))
+def test_the_example_that_a_refusal_gives_is_taken(dimension: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        units.parse("fish", dimension)
+    example = str(caught.value).partition('with a unit, "')[2].partition('"')[0]
+    assert units.parse(example, dimension) > 0
+
+
+@pytest.mark.parametrize("text", ["1,500 mm", "-2,000"])
+def test_a_comma_that_may_part_thousands_is_asked_back_and_both_answers_are_taken(text: str) -> None:
+    with pytest.raises(ConfigError, match="write which") as caught:
+        units.parse(text, "m")
+    small, large = (units.parse(part, "m") for part in str(caught.value).split('"')[1:4:2])
+    assert large == pytest.approx(1000 * small)
 
 
 @given(st.floats(-1e6, 1e6), st.sampled_from(sorted(units.DIMENSIONS)))

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
-from weldsim import units
 from weldsim.cli.dry_run import failures
 from weldsim.cli.options import ConfigOptions, keep_importable
 from weldsim.cli.outputs import check_folder, nearest_folder, refuse_file
-from weldsim.cli.quantities import SHARE, quantity
+from weldsim.cli.quantities import ALONG, SHARE, quantity
 from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
 from weldsim.cli.signals import INTERRUPTED, interrupted_once
 from weldsim.errors import InputError
@@ -60,7 +59,7 @@ class Execute(ConfigOptions):
     seam: int = 1
     """Which seam of the file, counted from 1."""
 
-    from_: Annotated[str | None, tyro.conf.arg(name="from", metavar="LENGTH")] = None
+    from_: Annotated[float | None, quantity(ALONG, "--from"), tyro.conf.arg(name="from")] = None
     """Go on with a weld that was stopped: up to where the seam is welded, "69 mm" say, as the report of the stop tells. The last
     `execution.overlap` before it is welded once more."""
 
@@ -82,7 +81,7 @@ class Execute(ConfigOptions):
             seam=self.seam - 1,
             arc=self.arc,
             speed_scale=self.speed_scale,
-            start=None if self.from_ is None else along_seam(self.from_),
+            start=self.from_,
             black_boxes=folder.with_name(f"{folder.name}.black-box"),
         )
         program = self._program(config)
@@ -236,15 +235,6 @@ class Execute(ConfigOptions):
         own = done.facts is not None and not own_arm(done.facts).nominal
         arm = ["--arm", str(folder / "contract.json")] if own else []
         return shlex.join(["weldsim", "dry-run", str(self.file), *scene, *arm, *self._settings(), *start])
-
-
-def along_seam(text: str) -> float:
-    """A length along a seam [m] from text such as "69 mm". Raises InputError where it has no unit, ConfigError for another."""
-    try:
-        float(text)
-    except ValueError:
-        return units.parse(text, "m", where="--from")
-    raise InputError(f'--from {text}: a length along the seam with its unit is needed, "{text} mm" say', value=text)
 
 
 def _arc(log: "ExecutionLog", job: "JobConfig") -> str:

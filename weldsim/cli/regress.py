@@ -27,8 +27,9 @@ class Regress(ConfigOptions):
 
     Each scene is scanned once for every seed and planned by both methods; every figure of the plan against the known seam is
     compared with tests/regression/golden.json (in an installed package: weldsim/_data/regression/golden.json). Exits 1 when a
-    figure is worse than its tolerance allows; a better one never fails. A seed that fails leaves its run directory. The
-    published method, whose single seeds are a matter of chance, is judged over all seeds: of 3 or more, against the 40 recorded.
+    figure is worse than its tolerance allows, or a finder of your own fails; a better figure never fails. A seed that fails
+    leaves its run directory. The published method, whose single seeds are a matter of chance, is judged over all seeds: of 3
+    or more, against the 40 recorded.
     """
 
     scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SCENE ...")] = ()
@@ -214,13 +215,15 @@ class Regress(ConfigOptions):
                 print(f"  left {row.folder}")
         for shift in outcome.shifts:
             print(f"  WORSE {shift_sentence(shift)}")
+        if failed := sum(bool(row.fault) for row in outcome.rows):
+            print(f"  FAILED {counted(failed, 'plan')}, by a fault of the finder's own")
         if unjudged(outcome):
             print(f"  {unjudged(outcome)}")
         if not self._judges:
             print(f"  nothing is judged: {path} holds figures of {GOLDEN_SENSOR}, not of {self.sensor}")
         elif not self.update:
             count = len(outcome.deviations) + len(outcome.shifts)
-            worse = "nothing is" if outcome.passed else f"{count} figure{' is' if count == 1 else 's are'}"
+            worse = "nothing is" if not count else f"{count} figure{' is' if count == 1 else 's are'}"
             print(f"  {worse} worse than {path} allows")
         for place in written:
             print(f"  wrote {place}")

@@ -8,10 +8,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from itertools import groupby, pairwise, takewhile
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 import tyro
 
+from weldsim import units
+from weldsim.cli.quantities import QuantitySpec, gathered
 from weldsim.errors import InputError
 from weldsim.settings import nearest
 
@@ -98,6 +100,24 @@ MEANT_OPTIONS = {
 }
 """What people say for an option."""
 
+MEANT_CHOICES = {
+    "robot": {
+        **dict.fromkeys(("simulated", "simulation", "simulator", "simulate", "twin", "mujoco", "virtual"), "sim"),
+        **dict.fromkeys(("real", "ur5", "ur5e", "ur_rtde", "rtde", "urx", "ursim", "cb3"), "ur"),
+    },
+    "sensor": {
+        **dict.fromkeys(("realsense", "depth"), "d415"),
+        **dict.fromkeys(("kinectv2", "kinect2", "kinect-v2"), "kinect"),
+        **dict.fromkeys(("ideal", "perfect", "true", "none"), "exact"),
+        **dict.fromkeys(("stereo", "d415_stereo"), "d415-stereo"),
+    },
+    "method": {**dict.fromkeys(("ours", "default"), "profile"), **dict.fromkeys(("published", "paper"), "thesis")},
+    "tool": {**dict.fromkeys(("tip", "wire", "tcp"), "torch"), **dict.fromkeys(("flange", "tool", "bare"), "tool0")},
+    "base": {**dict.fromkeys(("base", "ur"), "controller"), **dict.fromkeys(("ros", "urdf", "baselink"), "base_link")},
+    "profile": {**dict.fromkeys(("e-series", "eseries", "ur5e"), "e"), **dict.fromkeys(("ur5", "cb"), "cb3")},
+}
+"""What people say for a choice of an option."""
+
 SUFFIXES = {
     "run": (".toml",),
     "plan": (".ply", ".pcd", ".xyz", ".npz", ".npy"),
@@ -108,6 +128,7 @@ SUFFIXES = {
 _CHOICE = re.compile(r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)")
 _NUMBER = re.compile(r"error parsing (\S+): .*(?:int\(\)|float|INT|FLOAT).*(?:: '|\[')(.*)'")
 _MISSING = re.compile(r"missing value for argument '(\S+)'\. Expected (\d+) values")
+_VALUE = re.compile(r"=?\s*([-+]?\.?\d[\w.+-]*|true|false)\s*(\S*)")
 _FRAME = re.compile(r"[│╭╮╰╯║|]")
 _RULE = re.compile(r"[─━-]{4,}")
 
@@ -127,6 +148,7 @@ def parse(words: Sequence[str]) -> Command | int:
     if name not in COMMANDS:
         raise InputError(f"{_no_command(words)}; see weldsim --help", words=list(words))
     command, said = COMMANDS[name].load(), io.StringIO()
+    words = [name, *gathered(words[1:], _quantities(command))]
     _check_options(name, command, words[1:])
     try:
         with contextlib.redirect_stderr(said):
@@ -168,8 +190,9 @@ def _said_better(message: str, name: str, words: Sequence[str]) -> str:
 
     if match := _CHOICE.match(message):
         wrong, where, choices = match[1], match[2], re.findall(r"'([^']*)'", match[3])
-        choices = [one for one in get_args(FaultName) if one in choices] or choices  # tyro shuffles those that may be left out
-        meant = _action_meant(name, wrong, words) if where == "action" else nearest(wrong, choices)
+        # tyro shuffles those that may be left out
+        choices = [one for one in (*get_args(FaultName), *_choices(name, where)) if one in choices] or choices
+        meant = _action_meant(name, wrong, words) if where == "action" else _choice_meant(where.lstrip("-"), wrong, choices)
         return f"{where} {wrong!r} is not one of {', '.join(choices)}{f'; did you mean {meant}?' if meant else ''}"
     if match := _NUMBER.match(message):
         if match[1] == "--seam" and name in ("run", "plan"):
@@ -189,6 +212,43 @@ def _said_better(message: str, name: str, words: Sequence[str]) -> str:
         hint = f'; did you mean "{setting} {extra[0]}", in quotes?' if setting is not None else ""
         return f"{' '.join(extra)}: {'one word' if len(extra) == 1 else f'{len(extra)} words'} too many{hint}"
     return message
+
+
+def _choices(name: str, option: str) -> list[str]:
+    """What an option of a command may be, in the order in which help names it."""
+    known = fields(COMMANDS[name].load()) if name in COMMANDS else ()
+    hints = [one.type for one in known if f"--{_name(one)}" == option]
+    return [str(choice) for hint in hints for choice in _literals(hint)]
+
+
+def _literals(hint: Any) -> list[Any]:
+    """All choices of a type, in order."""
+    if get_origin(hint) is Literal:
+        return list(get_args(hint))
+    return [choice for part in get_args(hint) for choice in _literals(part)]
+
+
+def _choice_meant(option: str, wrong: str, choices: Sequence[str]) -> str:
+    """Which of the choices is meant, in whatever case or by another name; "" where none is near."""
+    word = wrong.lower()
+    known = MEANT_CHOICES.get(option, {}).get(word) or (units.known_unit(word, "m") if option == "units" else "")
+    return known if known in choices else nearest(word, choices)
+
+
+def _check_setting(name: str, words: Sequence[str]) -> None:
+    """Raises InputError for a setting in several words, `key = value` or `key value`, with the one that is meant.
+
+    Args:
+        words: behind `--set`.
+    """
+    key, rest = words[0], " ".join(takewhile(lambda word: not word.startswith("--"), words[1:4]))
+    match = _VALUE.match(rest)
+    if match is None or ("=" in key and not key.endswith("=")):
+        return
+    unit = match[2] if units.is_unit(match[2]) else ""
+    setting = f"{key.rstrip('= ')}={match[1]} {unit}".rstrip()
+    said = f"--set {key} {match[0].strip() if unit else match[0].removesuffix(match[2]).strip()}"
+    raise InputError(f"{said}: did you mean --set {shlex.quote(setting)}?; see weldsim {name} --help", words=[*words[:2]])
 
 
 def _values_after(option: str, words: Sequence[str]) -> list[str]:
@@ -236,6 +296,8 @@ def _no_command(words: Sequence[str]) -> str:
 
 def _command(name: str, words: Sequence[str]) -> str:
     """The command as one would type it."""
+    if name == "scenes" and words and not words[0].startswith("-"):
+        return _action_meant("scenes", words[0], ["scenes", *words]) or f"weldsim {name}"
     needed = ["--robot", "sim"] if name == "execute" and "--robot" not in words else []
     return " ".join(["weldsim", name, shlex.join([*words, *needed])]).rstrip()
 
@@ -257,6 +319,8 @@ def _check_options(name: str, command: Any, words: Sequence[str]) -> None:
         if word == "--":
             return
         option = word.lstrip("-").partition("=")[0].replace("_", "-")
+        if word == "--set" and words[index + 1 :]:
+            _check_setting(name, words[index + 1 :])
         if word.startswith("--") and option in lists:
             if option in given:  # the last would silently take the place of the others
                 raise InputError(f"--{option} is given twice; give its values together: --{option} A B", words=[word])
@@ -295,6 +359,12 @@ def _lists(command: Any) -> set[str]:
     alone = {tyro.conf.UseAppendAction, tyro.conf.Positional}
     plain = {_name(one): getattr(one.type, "__origin__", None) for one in fields(command) if not alone & set(_marks(one.type))}
     return {name for name, origin in plain.items() if origin is tuple or get_origin(origin) is tuple}
+
+
+def _quantities(command: Any) -> dict[str, QuantitySpec]:
+    """The options of a command that take quantities."""
+    marks = {f"--{_name(one)}": _marks(one.type) for one in fields(command)}
+    return {name: mark for name, own in marks.items() for mark in own if isinstance(mark, QuantitySpec)}
 
 
 def _name(field: Any) -> str:

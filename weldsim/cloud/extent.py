@@ -11,6 +11,7 @@ from weldsim.errors import CloudError
 from weldsim.records import MILLIMETRE_SPAN, PointCloud
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+NAMES = {"mm": "millimetres", "cm": "centimetres", "in": "inches"}
 MIN_SPAN = 0.005  # [m] a cloud smaller than this was scaled down twice, or shows no weld
 MAX_GRAIN = 0.0002  # [m] between neighbouring coordinates of a file in single precision
 FARTHEST = 3.0  # [m] from the base to the nearest point of a cloud: no arm of a welding cell reaches so far
@@ -59,6 +60,19 @@ def check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: i
         )
 
 
+def check_extent_of_array(name: str, points: Float[ndarray, "n 3"]) -> None:
+    """Raises CloudError for an array of points that is not in metres, or must be cropped. Args: name, what to call it."""
+    span = float(np.ptp(points, axis=0).max())
+    if span <= MILLIMETRE_SPAN:
+        return
+    spacing = _spacing(points)
+    meant = " or ".join(f"{NAMES[unit]} (times {METRES[unit]:g})" for unit in _units_of_part(span, spacing))
+    advice = f"it looks like {meant}; metres are wanted" if spacing >= ROOM_SPACING and meant else "crop it to the workpiece"
+    if spacing < ROOM_SPACING and meant:
+        advice += f"; or give metres if its numbers are {meant}"
+    raise CloudError(f"{name}: spans {span:.4g} m (limit {MILLIMETRE_SPAN:g} m): {advice}", span=span)
+
+
 def cropped_to(box: tuple[Sequence[float], Sequence[float]], points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
     """Which points (n,) lie in a box given by its corners, edges included."""
     low, high = np.array(box[0], float), np.array(box[1], float)
@@ -75,11 +89,13 @@ def _too_wide(points: Float[ndarray, "n 3"], unit: str, span: float, raw: RawClo
     if bulk <= MILLIMETRE_SPAN / 2:
         return f"96 % of the points lie within {bulk:.3g} m: remove the stray ones{_crop(points)}"
     spacing = _spacing(points)
-    if raw.unit is None and unit == "m" and (guess := _unit_of_part(span, spacing)) is not None:
-        name = {"mm": "millimetres", "cm": "centimetres", "in": "inches"}[guess]
-        if spacing >= ROOM_SPACING:
-            return f"it looks like {name}: pass --units {guess}"
-        return f"crop it to the workpiece{_crop(points)}; or pass --units {guess} if its numbers are {name}"
+    if raw.unit is None and unit == "m" and (guesses := _units_of_part(span, spacing)):
+        if spacing < ROOM_SPACING:
+            return f"crop it to the workpiece{_crop(points)}; or pass --units {guesses[0]} if its numbers are {NAMES[guesses[0]]}"
+        if len(guesses) == 1:
+            return f"it looks like {NAMES[guesses[0]]}: pass --units {guesses[0]}"
+        sizes = " or ".join(f"--units {guess}, which makes it {span * METRES[guess]:.3g} m" for guess in guesses)
+        return f"it looks like {' or '.join(NAMES[guess] for guess in guesses)}: pass {sizes}"
     return f"crop it to the workpiece{_crop(points)}" + ("" if unit == "m" else ", or correct its unit")
 
 
@@ -91,12 +107,14 @@ def _crop(points: Float[ndarray, "n 3"]) -> str:
     return f" (--set cloud.crop_min={low} --set cloud.crop_max={high} keeps what an arm at the origin reaches)"
 
 
-def _unit_of_part(span: float, spacing: float) -> str | None:
-    """The unit in which points of this span and spacing, both read in metres, are most like the scan of a part."""
+def _units_of_part(span: float, spacing: float) -> list[str]:
+    """The units in which points of this span and spacing, both read in metres, are most like the scan of a part, likeliest first:
+    one, or centimetres and inches, which are too much alike for a guess."""
     fits = [name for name in ("mm", "cm", "in") if LEAST_PART <= span * METRES[name] <= MOST_PART]
     if spacing < ROOM_SPACING:
         fits = [name for name in fits if spacing * METRES[name] > 0.1 * USUAL_SPACING]
-    return min(fits, key=lambda name: abs(np.log(spacing * METRES[name] / USUAL_SPACING)), default=None)
+    fits.sort(key=lambda name: abs(np.log(spacing * METRES[name] / USUAL_SPACING)))
+    return [name for name in fits[:2] if name in fits[:1] or {name, fits[0]} == {"cm", "in"}]
 
 
 def _spacing(points: Float[ndarray, "n 3"]) -> float:

@@ -25,7 +25,7 @@ from weldsim.cloud.sensor_frame import placed
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
 from weldsim.columns import decode, utf_16
-from weldsim.errors import CloudError, CloudFileError, OutputError
+from weldsim.errors import CloudError, CloudFileError, InputError, OutputError
 from weldsim.output import write_whole
 from weldsim.records import PointCloud
 
@@ -70,7 +70,8 @@ def read_cloud(
         with np.errstate(all="ignore"):  # signalling NaNs and the like are dropped below
             raw = placed(_reader(data)(data), given)
     except Unreadable as error:
-        raise CloudFileError(f"{path}: {error}", path=str(path), reason=str(error)) from None
+        reason = _of_another_kind(Path(path)) or str(error)
+        raise CloudFileError(f"{path}: {reason}", path=str(path), reason=reason) from None
     said = unit or raw.unit or "m"
     if raw.unit is not None and said != raw.unit:
         raise CloudError(f"{path}: --units {said}, but its header says {raw.unit}; leave --units out", path=str(path))
@@ -98,6 +99,17 @@ def read_cloud(
         view=None if view is None else view[keep],
         notes=raw.notes,
     )
+
+
+def _of_another_kind(path: Path) -> str:
+    """What a file that is no cloud is by its name, and what to do with it; "" for a cloud's name."""
+    kinds = {
+        ".toml": f"it is no cloud; of a scene, weldsim scan {path} --out {path.stem}.ply makes one",
+        ".json": f"it is no cloud; of a path, did you mean weldsim dry-run {path}?",
+        ".script": f"it is a robot program, no cloud; did you mean weldsim dry-run {path}?",
+        ".stl": "it is an STL mesh, no cloud; a scene with it under [mesh] can be scanned: weldsim scan SCENE.toml --out cloud.ply",
+    }
+    return kinds.get(path.suffix.lower(), "")
 
 
 def _reader(data: bytes) -> Callable[[bytes], RawCloud]:
@@ -204,12 +216,21 @@ def _breadth(points: Float[ndarray, "n 3"]) -> float:
     return float(np.sqrt(max(0.0, np.linalg.eigvalsh(centred.T @ centred / len(points))[1])))
 
 
-def write_cloud(path: str | Path, cloud: PointCloud) -> Path:
+def write_cloud(path: str | Path, cloud: PointCloud | Float[ndarray, "n 3"]) -> Path:
     """Where the cloud now lies: binary PLY (coordinates in double), NPZ (exact, with all viewpoints) or XYZ text (to 1 nm).
 
+    Args:
+        cloud: or its points [m].
     Raises:
         OutputError: a suffix other than .ply, .npz, .xyz, .txt, or a place that cannot be written.
+        InputError: what is neither a cloud nor an array.  RecordError: an array that is no cloud.
     """
+    if isinstance(cloud, ndarray):
+        cloud = PointCloud(points=cloud)
+    if not isinstance(path, str | Path) or not isinstance(cloud, PointCloud):
+        raise InputError(
+            f"write_cloud: a file name and a cloud, in this order, are wanted, not {type(path).__name__}, {type(cloud).__name__}"
+        )
     writers = {".ply": _ply_bytes, ".npz": _npz_bytes, ".xyz": _xyz_bytes, ".txt": _xyz_bytes}
     suffix = Path(path).suffix.lower()
     if suffix not in writers:

@@ -25,7 +25,8 @@ FIXTURE = "fixture"  # the body that carries the part and what holds it
 class Cell:
     """Attributes: name; model, compiled; collision, its check; q_start, where the arm stands [rad]; has_part; arm, whose joint
     angles model and collision take; left_out, clamps and bolts that the scene leaves out; place, where the part is in B [m],
-    None without a scene; shift, by how much that is not where the scene has it [m]; notes, what is odd about how it stands."""
+    None without a scene; shift, by how much that is not where the scene has it [m]; notes, what is odd about how it stands;
+    seams, of the part as the scene has it, the openings in B [m]."""
 
     name: str
     model: Any
@@ -37,6 +38,7 @@ class Cell:
     place: tuple[float, float] | None = None
     shift: tuple[float, float] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
+    seams: tuple[Float[ndarray, "_ 3"], ...] = ()
 
     def fitted(self, arm: Arm) -> "Cell":
         """The cell with another arm in it, its links where that arm's joints have them; itself where it is the same.
@@ -62,7 +64,8 @@ class Cell:
         body = model.body(FIXTURE).id
         model.body_pos[body] = self.model.body_pos[body] + X_WB.R @ move
         place = None if self.place is None else _plus(self.place, move)
-        return replace(self, model=model, collision=CellCollision(model), place=place, shift=_plus(self.shift, move))
+        seams = tuple(seam + move for seam in self.seams)
+        return replace(self, model=model, collision=CellCollision(model), place=place, shift=_plus(self.shift, move), seams=seams)
 
     def misplaced(self, move: Float[ndarray, "3"], points_B: Float[ndarray, "n 3"] | None = None) -> str | None:
         """Why part and fixture cannot be moved by so much in B [m], in words: into the arm's base, beside the table; else None.
@@ -114,6 +117,7 @@ def scene_cell(scene: "SceneConfig", q_start: Float[ndarray, "6"] | None = None)
         left_out=scene.fixture.without,
         place=(scene.pose.x, scene.pose.y),
         notes=world.notes,
+        seams=tuple(seam.opening_B for seam in world.known_seams),
     )
 
 

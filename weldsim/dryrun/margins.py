@@ -12,6 +12,7 @@ from weldsim.motion.arm import dexterity
 from weldsim.motion.collision import NEAR, in_words
 from weldsim.motion.config import MotionConfig
 from weldsim.motion.rungs import SINGULAR
+from weldsim.records import Segment
 
 SAMPLES = 400  # of a motion at which clearances are looked at
 
@@ -75,11 +76,14 @@ def _speed(trial: Trial, config: MotionConfig) -> Margin:
 
 
 def _singular(trial: Trial) -> Margin:
-    value = dexterity(trial.q)
-    row = int(value.argmin())
+    """The nearest to a singularity of all that leads the torch along a line; a move of the joints passes one unharmed."""
+    led = trial.arc_on.copy() if trial.trajectory is None else np.array([one != Segment.AIR for one in trial.trajectory.segments])
+    rows = np.flatnonzero(led) if len(led) == len(trial.q) and led.any() else np.arange(len(trial.q))
+    value = dexterity(trial.q[rows])
+    row = int(rows[value.argmin()])
     return Margin(
         figure="least tip travel for a turn of the joints",
-        value=1e3 * float(value[row]),
+        value=1e3 * float(value.min()),
         limit=1e3 * SINGULAR,
         unit="mm/rad",
         least=True,

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.dryrun.scatter import scatter_of
 from weldsim.dryrun.verdict import Verdict, Why
 from weldsim.frames import Transform
 from weldsim.motion.collision import Touch
@@ -16,9 +17,11 @@ from weldsim.records import TorchPath
 FASTEST = 0.25  # [m/s] greatest torch speed with the arc, the safety limit of manual mode
 JUMP = np.deg2rad(2.0)  # [rad] two poses may always differ by so much
 SAME = 1e-6  # [m] poses nearer to each other are one place
-BACK = np.deg2rad(150.0)  # [rad] travel that turns by more may lead back over itself
+BACK = np.deg2rad(120.0)  # [rad] travel that turns by more may lead back over itself
+LOOK = 0.8  # of the way back over which its direction is told
 LEAST_BACK = 0.0005  # [m] of travel back
 SCATTERS = 5.0  # standard deviations of the waypoints across travel that travel back must exceed
+DIRECTION = 12.0  # standard deviations of the waypoints apart: places that tell the direction of travel to 7 deg
 BESIDE = 0.1  # of its length that a way back may lie beside the way there: a weave's legs lie further apart
 
 
@@ -85,6 +88,8 @@ def turns_back(path: TorchPath) -> list[Fault]:
     for i in weld[1:]:
         if np.linalg.norm(path.X_BT.p[i] - path.X_BT.p[places[-1]]) > SAME:
             places.append(int(i))
+    across = _scatter_across(path.X_BT.p[places])
+    places = _apart(places, path.X_BT.p, DIRECTION * scatter_of(path).position)
     p = path.X_BT.p[places]
     if len(p) < 3:
         return []
@@ -92,19 +97,37 @@ def turns_back(path: TorchPath) -> list[Fault]:
     length = np.linalg.norm(step, axis=1)
     along = step / length[:, None]
     turn = np.arccos(np.clip(np.sum(along[1:] * along[:-1], axis=1), -1.0, 1.0))
-    least = max(LEAST_BACK, SCATTERS * _scatter_across(p))
+    least = max(LEAST_BACK, SCATTERS * across)
     out = []
     for k in np.flatnonzero(turn > BACK) + 1:
         back = _run(p[k:], -along[k - 1])
         there = _run(p[k::-1], -along[k - 1])
         both = min(back, there)
-        if both > least and both * np.sin(turn[k - 1]) < max(BESIDE * both, least):
+        if both > least and both * np.sin(_opening(p, int(k), both)) < max(BESIDE * both, least):
             text = (
                 f"travel turns back by {np.rad2deg(turn[k - 1]):.0f} deg and leads {1e3 * both:.1f} mm back over itself"
                 f" (limit {1e3 * least:.1f} mm); put the waypoints in the order of travel"
             )
             out.append(Fault(index=places[k], why="turns back", text=text))
     return out
+
+
+def _apart(places: list[int], p: Float[ndarray, "n 3"], distance: float) -> list[int]:
+    """Those of the places that lie so far from the one kept before [m]: the way between them is travel, not scatter."""
+    kept = places[:1]
+    for i in places[1:]:
+        if np.linalg.norm(p[i] - p[kept[-1]]) >= distance:
+            kept.append(i)
+    return kept
+
+
+def _opening(p: Float[ndarray, "n 3"], k: int, length: float) -> float:
+    """Angle between the way back from place k and the way there, both seen from there over most of `length` [m]; up to 90 deg."""
+    away = np.linalg.norm(p - p[k], axis=1) >= LOOK * length
+    after, before = k + int(away[k:].argmax()), k - int(away[k::-1].argmax())
+    back, there = p[after] - p[k], p[before] - p[k]
+    cosine = float(back @ there) / max(float(np.linalg.norm(back) * np.linalg.norm(there)), 1e-12)
+    return float(np.arccos(np.clip(cosine, 0.0, 1.0)))
 
 
 def _run(p: Float[ndarray, "n 3"], direction: Float[ndarray, "3"]) -> float:

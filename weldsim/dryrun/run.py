@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from weldsim.curves import project
 from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
 from weldsim.dryrun.margins import margins
@@ -16,6 +17,9 @@ from weldsim.dryrun.verdict import DryRun
 from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.motion.config import MotionConfig
 from weldsim.scene.cell import TABLE
+
+BESIDE = 0.005  # [m] of a weld from the scene's seam, from which it may be another part's
+FEW = 200  # places of a weld that are looked at
 
 
 def dry_run(
@@ -50,7 +54,7 @@ def dry_run(
         tell("fixes", None)
         fixes = for_all(fixes, all_followed, trials, cell, config, program.given)
     trials = [replace(trial, margins=margins(trial, cell, config)) for trial in trials]
-    notes = (*program.notes, *cell.notes, *_beside_table(program, cell))
+    notes = (*program.notes, *cell.notes, *_beside_table(program, cell), *_beside_seams(program, cell))
     return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=notes)
 
 
@@ -62,4 +66,19 @@ def _beside_table(program: Program, cell: Cell) -> list[str]:
         beyond = float(np.maximum(TABLE[0] - places, places - TABLE[1]).max())
         if beyond > 0 and not cell.has_part:
             notes.append(f"{name} goes {1e3 * beyond:.0f} mm beyond the table's edge; what holds the part there is not known")
+    return notes
+
+
+def _beside_seams(program: Program, cell: Cell) -> list[str]:
+    """Welds that lie off every seam of the scene's part: perhaps another part's, or it stands elsewhere; one sentence each."""
+    notes = []
+    for path, name in zip(program.paths, program.names, strict=True):
+        weld = path.X_BT.p[path.weld]
+        weld = weld[:: max(1, len(weld) // FEW)]
+        off = [project(weld, seam)[0] for seam in cell.seams]
+        if off and (far := float(np.quantile(np.min(off, axis=0), 0.95))) > BESIDE:
+            notes.append(
+                f"{name} lies up to {1e3 * far:.0f} mm off the nearest seam of the part in {cell.name}: is it that part's, and does"
+                " the part stand there?"
+            )
     return notes

@@ -7,11 +7,11 @@ millimetre needs joint accelerations that are the scatter's alone.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.interpolate import BSpline, make_smoothing_spline
 
-from weldsim.curves import arc_length
+from weldsim.curves import arc_length, project
 from weldsim.frames import Transform
 from weldsim.records import TorchPath
 
@@ -21,6 +21,8 @@ STILL = (5e-5, 0.02)  # [m], of the longer steps: nearer waypoints were recorded
 STEP = 0.001  # [m] between the poses of a refitted path
 LEAST = (1e-6, 1e-5)  # [m], [rad] scatter that counts as none
 QUANTILE = 0.35  # of the waypoints' distances: two corners among a dozen waypoints have no say yet
+WEAVE = (24, 0.6)  # waypoints that tell a weave, and the share of the variance at one frequency; of noise a fifth
+EVEN = 0.1  # of the variances of the scatter, the least over the greatest direction's: three axes of noise come to over 0.5
 LENGTHS = (0.9282, 1.2816)  # that share of vectors of two and of three independent standard normal components is shorter
 STRENGTHS = (1e-14, 1e2)  # of smoothing, over arc length in units of the path's own: none and almost a straight line
 
@@ -56,7 +58,7 @@ class Refit:
 def scatter_of(path: TorchPath) -> Scatter:
     """The waypoints' scatter: how far each is from the cubic through the two before and the two after it.
 
-    From the distance that QUANTILE of them keep to: corners and jumps, which are few, have no say.
+    From the distance that QUANTILE of them keep to: corners and jumps, which are few, have no say. A weave is no scatter.
     """
     places = _places(path)
     if len(places) < FEWEST:
@@ -66,26 +68,57 @@ def scatter_of(path: TorchPath) -> Scatter:
     scale = np.sqrt(1.0 + np.sum(weights**2, axis=1))
     out = []
     for values, length in zip((p, 2.0 * q), LENGTHS, strict=True):  # half the turn stands in a quaternion
-        around = np.stack([values[i : len(values) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
-        off = np.linalg.norm(values[2:-2] - np.einsum("ij,ijk->ik", weights, around), axis=1)
+        off_cubic = _off_cubic(values, weights)
+        if _weaves(off_cubic):
+            out.append(0.0)
+            continue
+        off = np.linalg.norm(off_cubic, axis=1)
         out.append(float(np.quantile(off / scale, QUANTILE)) / length)
     return Scatter(position=out[0], rotation=out[1])
 
 
+def is_even(path: TorchPath) -> bool:
+    """Whether the waypoints' places scatter alike in every direction, as noise does, and a weave, which is flat, does not."""
+    p = path.X_BT.p[_places(path)]
+    if len(p) < FEWEST:
+        return False
+    off = _off_cubic(p, _cubic_weights(arc_length(p)))
+    spread = np.linalg.eigvalsh(off.T @ off)
+    return bool(spread[0] > EVEN * spread[-1])
+
+
+def _weaves(off: Float[ndarray, "m d"]) -> bool:
+    """Whether the distances from a smooth curve come and go at one frequency, as a weave's do: noise has them all."""
+    power = np.sum(np.abs(np.fft.rfft(off - off.mean(axis=0), axis=0)[1:]) ** 2, axis=1)
+    if len(off) < WEAVE[0] or power.sum() <= 0:
+        return False
+    line = int(power.argmax())
+    return bool(power[max(line - 1, 0) : line + 2].sum() > WEAVE[1] * power.sum())
+
+
+def _off_cubic(values: Float[ndarray, "n d"], weights: Float[ndarray, "m 4"]) -> Float[ndarray, "m d"]:
+    """Each value, but for two at both ends, from what the two before and the two after it make it."""
+    around = np.stack([values[i : len(values) - 4 + i] for i in (0, 1, 3, 4)], axis=1)
+    return values[2:-2] - np.einsum("ij,ijk->ik", weights, around)
+
+
 def refit(path: TorchPath, scatter: Scatter, share: float = 1.0) -> Refit:
-    """The smoothest curve whose root mean square distance from the waypoints is `share` of their scatter."""
+    """The smoothest curve whose root mean square distance from the waypoints is `share` of their scatter.
+
+    Of positions that is the distance across the curve: waypoints that lie closer than they scatter lead forth and back along it.
+    """
     places = _places(path)
     p, q = path.X_BT.p[places], _continuous(path.X_BT.quaternion[places])
     s = arc_length(p)
     u = s / s[-1]
-    position = _smoothed(u, p, share * max(scatter.position, LEAST[0]) * np.sqrt(2.0))
+    position = _smoothed(u, p, share * max(scatter.position, LEAST[0]) * np.sqrt(2.0), across=True)
     rotation = _smoothed(u, q, share * max(scatter.rotation, LEAST[1]) * np.sqrt(3.0) / 2.0)
-    dense = np.linspace(0.0, 1.0, max(len(places), int(np.ceil(s[-1] / STEP)) + 1))
+    length = float(arc_length(position(np.linspace(0.0, 1.0, len(places))))[-1])
+    dense = np.linspace(0.0, 1.0, max(len(places), int(np.ceil(length / STEP)) + 1))
     R = Transform.from_quaternion("BT", _unit(rotation(dense)), position(dense))
     at_waypoints = Transform.from_quaternion("BT", _unit(rotation(u)), position(u))
     index = np.searchsorted(places, np.arange(len(path.X_BT)), side="right") - 1
-    nearest = np.abs(dense[:, None] - u[None, :]).argmin(axis=0)
-    chord = np.stack([np.interp(dense, u, column) for column in p.T], axis=1)
+    nearest = nearest_in_order(dense, u)
     before = places[np.clip(np.searchsorted(u, dense, side="right") - 1, 0, len(places) - 2)]
     turn = 2.0 * np.arccos(np.clip(np.abs(np.sum(at_waypoints.quaternion * q, axis=1)), 0.0, 1.0))
     fitted = TorchPath(
@@ -99,10 +132,16 @@ def refit(path: TorchPath, scatter: Scatter, share: float = 1.0) -> Refit:
     return Refit(
         path=fitted,
         nearest=nearest[index],
-        position_off=float(np.linalg.norm(at_waypoints.p - p, axis=1).max()),
+        position_off=float(project(p, R.p)[0].max()),
         rotation_off=float(turn.max()),
-        chord_off=float(np.linalg.norm(R.p - chord, axis=1).max()),
+        chord_off=float(project(R.p, p)[0].max()),
     )
+
+
+def nearest_in_order(values: Float[ndarray, "n"], at: Float[ndarray, "m"]) -> Int[ndarray, "m"]:
+    """Index of the one of the values, which rise, that is nearest to each of `at`; of two equally near the first."""
+    after = np.clip(np.searchsorted(values, at), 1, len(values) - 1)
+    return np.where(at - values[after - 1] <= values[after] - at, after - 1, after)
 
 
 def _places(path: TorchPath) -> ndarray:
@@ -138,8 +177,12 @@ def _cubic_weights(s: Float[ndarray, "n"]) -> Float[ndarray, "m 4"]:
     return out
 
 
-def _smoothed(u: Float[ndarray, "n"], values: Float[ndarray, "n d"], distance: float) -> BSpline:
-    """The spline with the strongest smoothing whose root mean square distance from the values is `distance` at most."""
+def _smoothed(u: Float[ndarray, "n"], values: Float[ndarray, "n d"], distance: float, *, across: bool = False) -> BSpline:
+    """The spline with the strongest smoothing whose root mean square distance from the values is `distance` at most.
+
+    Args:
+        across: whether only what of the distance is across the spline counts.
+    """
     best = make_smoothing_spline(u, values, lam=0.0)
     if distance <= LEAST[0]:
         return best
@@ -147,8 +190,12 @@ def _smoothed(u: Float[ndarray, "n"], values: Float[ndarray, "n d"], distance: f
     for _ in range(40):
         middle = (low + high) / 2
         spline = make_smoothing_spline(u, values, lam=float(np.exp(middle)))
-        off = np.sqrt(np.mean(np.sum((spline(u) - values) ** 2, axis=1)))
-        if off <= distance:
+        off = spline(u) - values
+        if across:
+            along = spline.derivative()(u)
+            along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+            off -= np.sum(off * along, axis=1, keepdims=True) * along
+        if np.sqrt(np.mean(np.sum(off**2, axis=1))) <= distance:
             best, low = spline, middle
         else:
             high = middle

@@ -1,6 +1,7 @@
 """A torch path tried: every waypoint judged on its own, then the whole motion planned."""
 
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 from jaxtyping import Float
@@ -39,7 +40,7 @@ def try_path(path: TorchPath, name: str, cell: Cell, config: MotionConfig) -> Tr
     if rungs.first_refused is not None:
         found = _first_refused(rail, rungs, cell, config)
         if found is not None:
-            return _refused(base, path, rail, rungs, *found)
+            return _refused(base, path, rail, rungs, *found, cell, config)
         config = replace(config, rolls=EXACT_ROLLS)
         rungs = make_rungs(rail, cell.arm, config, cell.collision)
     try:
@@ -102,10 +103,8 @@ def _refusals(path: TorchPath, cell: Cell, config: MotionConfig) -> list[Fault]:
     mine = rail.index >= 0
     apart = places(rail)  # of a dense path not every pose is looked at
     rungs = make_rungs(rail, cell.arm, config, cell.collision, at=rail.s[mine] if mine.sum() < len(apart) else apart)
-    nearest = np.abs(rail.s[mine][:, None] - rungs.s[None, :]).argmin(axis=1)
     kept, out = np.flatnonzero(moved), []
-    for index, k in zip(rail.index[mine], nearest, strict=True):
-        refusal = rungs.refusals[int(k)]
+    for index, refusal in zip(rail.index[mine], _refusals_at(rail.s[mine], rail, rungs, cell, config), strict=True):
         if refusal is not None:
             text = _said(refusal.why, refusal.text, refusal.options, rail)
             out.append(Fault(index=int(kept[index]), why=refusal.why, text=text, touch=refusal.touch))
@@ -126,14 +125,43 @@ def _first_refused(rail: Rail, rungs: Rungs, cell: Cell, config: MotionConfig) -
     return None
 
 
-def _refused(base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, s_first: float, refusal: Refusal) -> Trial:
+def _refusals_at(s: Float[ndarray, "n"], rail: Rail, rungs: Rungs, cell: Cell, config: MotionConfig) -> list[Refusal | None]:
+    """The refusal of each place [m]: that of the nearest rung of the stretch that it lies in, whose ends are found to FINE."""
+    out: list[Refusal | None] = [None] * len(s)
+    for refused, run in groupby(range(len(rungs.s)), lambda i: rungs.refusals[i] is not None):
+        if not refused:
+            continue
+        mine = list(run)
+        a, b = mine[0], mine[-1]
+        low = float(rungs.s[a]) if a == 0 else _border(rail, float(rungs.s[a - 1]), float(rungs.s[a]), cell, config)
+        high = float(rungs.s[b])
+        if b + 1 < len(rungs.s):
+            high = _border(rail, float(rungs.s[b + 1]), high, cell, config)
+        for i in np.flatnonzero((s >= low - 1e-9) & (s <= high + 1e-9)):
+            out[i] = rungs.refusals[mine[int(np.abs(rungs.s[mine] - s[i]).argmin())]]
+    return out
+
+
+def _border(rail: Rail, clear: float, refused: float, cell: Cell, config: MotionConfig) -> float:
+    """The place between one that has a posture and one that has none, nearest to the first and without one, to FINE [m]."""
+    exact = replace(config, rolls=EXACT_ROLLS)
+    while abs(refused - clear) > FINE:
+        at = np.array([(clear + refused) / 2])
+        refusal = make_rungs(rail, cell.arm, config, cell.collision, at=at).refusals[0]
+        if refusal is not None and rail.roll_free:
+            refusal = make_rungs(rail, cell.arm, exact, cell.collision, at=at).refusals[0]
+        clear, refused = (float(at[0]), refused) if refusal is None else (clear, float(at[0]))
+    return refused
+
+
+def _refused(
+    base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, s_first: float, refusal: Refusal, cell: Cell, config: MotionConfig
+) -> Trial:
     """Poses at which no posture will do, the first of them at s_first [m]."""
     verdicts = list(_all(path))
-    nearest = np.abs(path.s[:, None] - rungs.s[None, :]).argmin(axis=1)
-    for i, k in enumerate(nearest):
-        mine = rungs.refusals[int(k)]
+    for i, mine in enumerate(_refusals_at(path.s, rail, rungs, cell, config)):
         if mine is not None and path.s[i] >= s_first - 1e-9:
-            verdicts[i] = failing(verdicts[i], Fault(index=i, why=mine.why, text=mine.text, touch=mine.touch))
+            verdicts[i] = failing(verdicts[i], Fault(index=i, why=mine.why, text=_given(mine.text, rail), touch=mine.touch))
     lead = "" if rail.start <= s_first <= rail.end else f" on the {'lead-in' if s_first < rail.start else 'lead-out'}"
     index = rail.path_index(s_first)
     text = f"s = {1e3 * s_first:.1f} mm{lead}: {_said(refusal.why, refusal.text, refusal.options, rail)}"
@@ -152,6 +180,11 @@ def _refused(base: Trial, path: TorchPath, rail: Rail, rungs: Rungs, s_first: fl
 def _said(why: Why, text: str, options: int, rail: Rail) -> str:
     if why == "collision":
         return f"all {options} postures that reach it touch something, the least deep: {text}"
+    return _given(text, rail)
+
+
+def _given(text: str, rail: Rail) -> str:
+    """A reason as it is where the rotation about the wire is free, or given."""
     return text if rail.roll_free else text.replace("any rotation", "the given rotation")
 
 

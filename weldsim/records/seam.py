@@ -12,6 +12,8 @@ from weldsim.records.checks import check_increasing, check_metres, check_unit, r
 
 JOINED = 1e-6  # [m] between the ends of a ring
 SAME_PLACE = 1e-9  # [m] between points that are one
+BACK = -0.5  # cosine of the turn from which a line leads back over itself: 120 deg
+LEAST_STEP = 0.5e-3  # [m] shorter steps may be noise of who measured the points
 LEAST_ACROSS = 0.05  # share of a normal that must stand across travel
 
 Reference = Literal["opening", "root", "gap_mid"]
@@ -102,7 +104,7 @@ class Seam:
             normals: (n, 3), or (3,) for all: out of the surface; what of them lies along travel is taken off.
             width: between the lips [m].  confidence: 0 to 1.  reference, joint: which line of which joint the points are.
         Raises:
-            RecordError: fewer than two places, numbers that are not finite, normals along travel.
+            RecordError: fewer than two places, numbers that are not finite, points out of order, normals along travel.
         """
         try:
             line, up = np.asarray(points, float), np.asarray(normals, float)
@@ -116,6 +118,9 @@ class Seam:
         line, up = line[keep], np.broadcast_to(up, line.shape)[keep]
         if len(line) < 2:
             raise RecordError(f"Seam.points_B: {len(line)} places; a seam needs two", field="points_B")
+        _check_turns(line)
+        if not (np.linalg.norm(up, axis=1) > 0).all():
+            raise RecordError("Seam.normals_B: a normal is zero", field="normals_B")
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
         closed = len(line) > 3 and bool(np.linalg.norm(line[-1] - line[0]) <= JOINED)
         tangents = np.gradient(line, s, axis=0)
@@ -145,6 +150,22 @@ class Seam:
     def length(self) -> float:
         """Arc length [m]."""
         return float(self.s[-1] - self.s[0])
+
+
+def _check_turns(line: Float[ndarray, "n 3"]) -> None:
+    """Raises RecordError where a polyline [m] turns back on itself: points that are not in order do."""
+    steps = np.diff(line, axis=0)
+    length = np.linalg.norm(steps, axis=1)
+    turn = np.einsum("ij,ij->i", steps[1:], steps[:-1]) / (length[1:] * length[:-1])
+    back = np.flatnonzero((turn < BACK) & (np.minimum(length[1:], length[:-1]) > LEAST_STEP))
+    if len(back):
+        i = int(back[0]) + 1
+        place = ", ".join(f"{value:.4f}" for value in line[i])
+        raise RecordError(
+            f"Seam.points_B: the line turns back on itself at point {i + 1}, ({place}) m; sort the points as the torch is to"
+            " travel",
+            field="points_B",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

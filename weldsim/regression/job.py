@@ -64,6 +64,7 @@ class Row:
             this seed or, where the record is a distribution, all seeds of the run.
         folder: run directory left behind, or None.  picture: JPEG bytes, or None.
         scan_seconds: building and scanning, shared by all methods of the scene and seed.
+        fault: what a finder of one's own failed with, "" where it did not.
     """
 
     figures: Figures
@@ -72,11 +73,12 @@ class Row:
     folder: str | None = None
     picture: bytes | None = None
     scan_seconds: float = 0.0
+    fault: str = ""
 
     @property
     def passed(self) -> bool:
-        """Whether no figure is worse than it may be."""
-        return not self.deviations
+        """Whether no figure is worse than it may be, and no finder failed."""
+        return not self.deviations and not self.fault
 
 
 def carry_out(task: Task) -> tuple[Row, ...]:
@@ -103,11 +105,12 @@ def _built(scene: "SceneConfig", twin: "TwinConfig") -> "World":
 
 
 def _planned(task: Task, method: str, seen: Sighting) -> Row:
-    config, refused, clock = task.methods[method], "", Clock()
+    config, refused, fault, clock = task.methods[method], "", "", Clock()
     try:
         result = plan(seen.cloud, config, find=task.finders.get(method), clock=clock)
     except WeldsimError as error:  # a line that no torch can follow, say: nothing is planned then
         refused, result = str(error), _nothing(seen, method, config, str(error), clock)
+        fault = refused if method in task.finders and isinstance(error, InputError) else ""
     try:
         done = finish(seen, result, config, execute=task.execute)
     except MotionError as error:
@@ -133,7 +136,12 @@ def _planned(task: Task, method: str, seen: Sighting) -> Row:
         picture = _picture(done)
     judged = any(entry.judges(task.seed) for entry in entries.values())
     return Row(
-        figures=figures, deviations=deviations, judged=judged, folder=None if folder is None else str(folder), picture=picture
+        figures=figures,
+        deviations=deviations,
+        judged=judged,
+        folder=None if folder is None else str(folder),
+        picture=picture,
+        fault=fault,
     )
 
 

@@ -57,6 +57,8 @@ def _case(suite: ElementTree.Element, row: Row) -> None:
         message = sentence(first) + (f" (and {len(others)} more)" if others else "")
         failure = ElementTree.SubElement(case, "failure", message=_clean(message), type="WorseThanGolden")
         failure.text = _clean("\n".join(_lines(row.deviations, row.folder)))
+    elif row.fault:
+        ElementTree.SubElement(case, "failure", message=_clean(row.fault), type="FinderFailed")
     elif not row.judged:
         ElementTree.SubElement(case, "skipped", message="no golden figures; record them with --update --reason")
     out = ElementTree.SubElement(case, "system-out")

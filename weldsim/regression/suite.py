@@ -61,8 +61,8 @@ class Regression:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is worse than it may be."""
-        return not self.deviations and not self.shifts
+        """Whether nothing is worse than it may be, and no finder failed."""
+        return not self.deviations and not self.shifts and not any(row.fault for row in self.rows)
 
     def of(self, scene: str, method: str) -> tuple[Row, ...]:
         """The rows of one scene and method, a seed each."""

@@ -49,11 +49,16 @@ def scene_path(name: str | Path) -> Path:
     if path.suffix == ".toml":
         if path.is_file():
             return path
-        raise SceneError(f"scene {str(name)!r}: no such file", scene=str(name), allowed=scene_names())
+        meant = f"; did you mean {path.stem}, which comes with weldsim?" if path.stem in scene_names() else ""
+        raise SceneError(f"scene {str(name)!r}: no such file{meant}", scene=str(name), allowed=scene_names())
     if str(name) in scene_names():
         return scenes_folder() / f"{name}.toml"
     if said := next((said for suffixes, said in OTHERS if path.suffix.lower() in suffixes), ""):
         raise SceneError(f"{name} is {said.format(name=path.name, path=name)}", scene=str(name), allowed=scene_names())
+    if path.is_dir():
+        inside = path / "path.json"
+        kind = f"a run directory, no scene; did you mean weldsim dry-run {inside}?" if inside.is_file() else "a folder, no scene"
+        raise SceneError(f"{name} is {kind}", scene=str(name), allowed=scene_names())
     beside = path.with_name(f"{path.name}.toml")
     meant = str(beside) if beside.is_file() else nearest(str(name), scene_names())
     raise SceneError(

@@ -37,18 +37,18 @@ def rest_of(path: TorchPath, s: Metre, overlap: Metre, name: str) -> TorchPath:
     return path if start <= begin + 1e-6 else cut_path(path, (start,))[1]
 
 
-def way_on(words: list[str], far: WeldProgress, path: TorchPath, folder: Path, begun: str | None = None) -> str:
+def way_on(words: list[str], far: WeldProgress, path: TorchPath, folder: Path, begun: Metre | None = None) -> str:
     """How to go on with a weld that was stopped, in words: the command that welds the rest, or that there is none.
 
     Args:
         words: of the command that welds the seam, without where from and where to.  far: how far the weld came.
-        path: it was on.  folder: its run directory.  begun: where it was itself to go on from, as given.
+        path: it was on.  folder: its run directory.  begun: where it was itself to go on from [m].
     """
     left = float(path.s[path.weld][-1]) - far.s_to
     if left < SHORTEST:
         return f"{1e3 * left:.1f} mm of the seam are left, too little to go on with"
     if far.welded <= 0:
-        again = [*words, *([] if begun is None else ["--from", begun]), "--out", str(folder)]
+        again = [*words, *([] if begun is None else ["--from", f"{1e3 * begun:.10g} mm"]), "--out", str(folder)]
         return f"nothing of it is welded; to weld it: {shlex.join(again)}"
     tenths = int(far.s_to * 1e4 + 1e-6)  # rounded up, a gap would be left
     beside = folder.with_name(f"{FROM.sub('', folder.name)}-from-{1e3 * far.s_to:.0f}")

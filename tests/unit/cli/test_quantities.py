@@ -130,6 +130,62 @@ def test_a_quantity_is_si_in_the_command(line, name, value):
 
 
 @pytest.mark.parametrize(
+    ("line", "name", "value"),
+    [
+        ("dry-run a.csv --speed 5 mm/s", "speed", 0.005),
+        ("dry-run a.csv --turn -15 deg --no-fix", "turn", math.radians(-15)),
+        ("dry-run --turn 15 Degrees a.csv", "turn", math.radians(15)),
+        ('dry-run a.csv --turn "1,5 deg"', "turn", math.radians(1.5)),
+        ("dry-run a.csv --speed 12 in/min", "speed", 12 * 0.0254 / 60),
+        ("dry-run a.csv --speed 0.3 m/min", "speed", 0.005),
+        ("dry-run a.csv --move 20 mm -30 mm", "move", (0.02, -0.03)),
+        ("dry-run --move 20mm -30mm a.csv", "move", (0.02, -0.03)),
+        ('dry-run a.csv --move "20mm -30mm"', "move", (0.02, -0.03)),
+        ('dry-run a.csv --move "20,5 mm; -30 mm"', "move", (0.0205, -0.03)),
+        ('dry-run a.csv --move "20,5 mm, 3,5 mm"', "move", (0.0205, 0.0035)),
+        ("dry-run a.csv --lean 5 deg 0", "lean", (math.radians(5), 0.0)),
+        ("dry-run a.csv --start [-1.57,-1.3,-1.9,-1.5,1.57,0]", "start", (-1.57, -1.3, -1.9, -1.5, 1.57, 0.0)),
+        (
+            "dry-run a.csv --start -90 deg, -75 deg, -109 deg, -86 deg, 90 deg, 0",
+            "start",
+            tuple(map(math.radians, (-90, -75, -109, -86, 90, 0))),
+        ),
+        ("plan a.ply --viewpoint 0,-0.75,0.75", "viewpoint", (0.0, -0.75, 0.75)),
+        ('plan a.ply --viewpoint "0 -0.75 0.75"', "viewpoint", (0.0, -0.75, 0.75)),
+        ("plan a.ply --viewpoint=0,-0.75,0.75", "viewpoint", (0.0, -0.75, 0.75)),
+        ("plan --viewpoint 0 -750 mm 750 mm a.ply", "viewpoint", (0.0, -0.75, 0.75)),
+        ("plan a.ply --near '(0, -0.45, 0)'", "near", (0.0, -0.45, 0.0)),
+        ("execute a.json --robot sim --speed-scale 50 %", "speed_scale", 0.5),
+        ("execute a.json --robot sim --from 69 mm", "from_", 0.069),
+        ("controller --seconds 2 seconds", "seconds", 2.0),
+    ],
+)
+def test_values_are_read_however_the_shell_parted_them(line, name, value):
+    command = parse(shlex.split(line))
+    assert getattr(command, name) == pytest.approx(value, rel=1e-12)
+    assert str(getattr(command, "file", None) or getattr(command, "cloud", None) or "a.")[:2] == "a."
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("dry-run a.csv --turn 15 mm", "--turn '15 mm': unit 'mm' is not one of rad"),
+        ("dry-run a.csv --move 20 mm", "--move '20 mm': 1 given, 2 needed"),
+        ("dry-run a.csv --speed 5 6", "6: one word too many"),
+        ('dry-run a.csv --speed "1,500 mm/s"', '"1.500 mm/s" or "1500 mm/s"? write which'),
+        ("dry-run a.csv --speed fast", '"8 mm/s" say'),
+        ("dry-run a.csv --turn much", '"15 deg" say'),
+        ("execute a.json --robot sim --from 69", '"69 mm" is meant?'),
+    ],
+)
+def test_what_stays_no_quantity_is_named_as_it_was_meant(line, says, capsys):
+    assert main(shlex.split(line)) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert says in said
+
+
+@pytest.mark.parametrize(
     ("line", "says"),
     [
         ("plan a.ply --near 0 0 nan", "--near '0, 0, nan': a finite number is needed"),

@@ -38,6 +38,8 @@ def answer(words: list[str], capsys: pytest.CaptureFixture) -> str:
         ("show cuboid", "weldsim scenes show cuboid"),
         ("export cuboid -o cell.xml", "weldsim scenes export cuboid -o cell.xml"),
         ("scene", "weldsim scenes"),
+        ("scene curve", "weldsim scenes show curve"),
+        ("scens export cuboid -o a.xml", "weldsim scenes export cuboid -o a.xml"),
         ("list", "weldsim scenes"),
         ("settings cuboid", "weldsim config cuboid"),
         ("straight --seed 2", "weldsim run straight --seed 2"),
@@ -84,6 +86,48 @@ def test_the_option_meant_is_told_and_is_one(line, meant, capsys):
     wrong = re.search(r"has no option (\S+);", said)
     assert wrong
     assert callable(parse([word.replace(wrong[1], meant) if word.startswith(wrong[1]) else word for word in words]))
+
+
+def _after(words: list[str], option: str, value: str) -> list[str]:
+    """The words with the value behind an option replaced."""
+    at = words.index(option)
+    return [*words[: at + 1], value, *words[at + 2 :]]
+
+
+@pytest.mark.parametrize(
+    ("line", "option", "meant"),
+    [
+        ("plan a.ply --units MM", "--units", "mm"),
+        ("plan a.ply --units millimetres", "--units", "mm"),
+        ("plan a.ply --units Inches", "--units", "in"),
+        ("plan a.ply --method Profile", "--method", "profile"),
+        ("run straight --method published", "--method", "thesis"),
+        ("run straight --sensor D415", "--sensor", "d415"),
+        ("scan straight --sensor kinectv2", "--sensor", "kinect"),
+        ("execute a.json --robot simulated", "--robot", "sim"),
+        ("execute a.json --robot UR5", "--robot", "ur"),
+        ("dry-run a.csv --tool TCP", "--tool", "torch"),
+        ("dry-run a.csv --base ros", "--base", "base_link"),
+        ("controller --profile e-series", "--profile", "e"),
+    ],
+)
+def test_the_choice_meant_is_told_and_is_one(line, option, meant, capsys):
+    words = shlex.split(line)
+    said = answer(words, capsys)
+    assert f"; did you mean {meant}?" in said
+    assert callable(parse(_after(words, option, meant)))
+
+
+def test_choices_are_named_in_the_order_of_the_help(capsys):
+    assert "one of m, cm, mm, in" in answer(["plan", "a.ply", "--units", "x"], capsys)
+    assert "one of profile, thesis" in answer(["plan", "a.ply", "--method", "x"], capsys)
+
+
+@pytest.mark.parametrize("words", ["path.speed = 0.006", "path.speed 0.006", "path.speed =0.006", "path.speed '6 mm/s'"])
+def test_a_setting_in_several_words_is_told_in_one_that_works(words, capsys):
+    said = answer(["config", "--set", *shlex.split(words)], capsys)
+    meant = said.partition("did you mean ")[2].partition("?; see")[0]
+    assert main(["config", *shlex.split(meant)]) == 0
 
 
 @pytest.mark.parametrize(
@@ -265,3 +309,30 @@ def test_help_is_a_command_too(capsys):
 @pytest.mark.parametrize(("words", "seam"), [("plan a.ply --seam all", "all"), ("plan a.ply --seam 2", 2), ("plan a.ply", None)])
 def test_all_seams_may_be_asked_for_by_name(words, seam):
     assert parse(words.split()).seam == seam  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("run curve.toml", "did you mean curve, which comes with weldsim?"),
+        ("run job", "job is a run directory, no scene; did you mean weldsim dry-run job/path.json?"),
+        ("run empty", "empty is a folder, no scene"),
+        ("plan mine.toml", "it is no cloud; of a scene, weldsim scan mine.toml --out mine.ply makes one"),
+        ("plan part.stl", "it is an STL mesh, no cloud"),
+        ("plan job/path.json", "did you mean weldsim dry-run job/path.json?"),
+        ("plan robot.script", "it is a robot program, no cloud; did you mean weldsim dry-run robot.script?"),
+    ],
+)
+def test_a_file_of_another_kind_is_called_that(line, says, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("job", "empty"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "job" / "path.json").write_text('{"schema": "weldsim.path/1"}')
+    (tmp_path / "mine.toml").write_text('workpiece = "cuboid"\n')
+    (tmp_path / "part.stl").write_bytes(bytes(200))
+    (tmp_path / "robot.script").write_text("def p():\nend\n")
+    said = answer(shlex.split(line), capsys)
+    assert says in said
+    meant = re.search(r"(?:did you mean |of a scene, )(weldsim [^?;]*?)(?:\?| makes)", said)
+    if meant:
+        assert callable(parse(shlex.split(meant[1])[1:]))

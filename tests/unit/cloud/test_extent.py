@@ -1,10 +1,12 @@
 """Clouds and cameras in another unit, another frame or too large: refused with a remedy, and the remedy works."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import weldsim
 from weldsim.cloud.extent import REACH, check_reach
 from weldsim.cloud.files import check_plannable, read_cloud
 from weldsim.errors import CloudError
@@ -40,12 +42,22 @@ def test_a_room_in_metres_is_told_to_crop_and_the_options_named_do(tmp_path: Pat
 
 
 @pytest.mark.parametrize("spacing", [0.0008, 0.002])
-@pytest.mark.parametrize(("unit", "scale"), [("mm", 1e3), ("cm", 100.0)])
+@pytest.mark.parametrize(("unit", "scale"), [("mm", 1e3), ("cm", 100.0), ("in", 1 / 0.0254)])
 def test_a_part_in_another_unit_is_told_that_unit_and_it_works(tmp_path: Path, unit: str, scale: float, spacing: float) -> None:
+    """Centimetres and inches are too much alike: both are told, with the size that they make of it."""
     np.save(tmp_path / "part.npy", plate(spacing) * scale)
-    with pytest.raises(CloudError, match=f"pass --units {unit}$"):
+    with pytest.raises(CloudError) as caught:
         read_cloud(tmp_path / "part.npy")
-    check_plannable(read_cloud(tmp_path / "part.npy", unit=unit))  # type: ignore[arg-type]
+    told = dict(re.findall(r"--units (\w+)(?:, which makes it ([0-9.]+) m)?", str(caught.value)))
+    assert unit in told
+    assert told.keys() <= {unit} or told.keys() == {"cm", "in"}
+    read = read_cloud(tmp_path / "part.npy", unit=unit)  # type: ignore[arg-type]
+    check_plannable(read)
+    assert not told[unit] or float(told[unit]) == pytest.approx(float(np.ptp(read.points, axis=0).max()), rel=0.01)
+    with pytest.raises(CloudError) as caught:
+        weldsim.plan(plate(spacing) * scale)
+    factors = [float(factor) for factor in re.findall(r"times ([0-9.e-]+)", str(caught.value))]
+    assert any(factor * scale == pytest.approx(1.0) for factor in factors)
 
 
 def test_stray_points_are_told_and_cropping_them_works(tmp_path: Path) -> None:

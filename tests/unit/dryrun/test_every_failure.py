@@ -104,6 +104,15 @@ def test_two_walls_between_the_places_looked_at_are_two_stretches() -> None:
     assert [one["bodies"][1] for one in told["trials"][0]["waypoints"] if one["verdict"] == "collision"] == ["wall 0", "wall 1"]
 
 
+def test_the_borders_of_every_stretch_without_a_posture_are_true_to_a_millimetre() -> None:
+    path = line()
+    walls = ((-0.0413, -0.0207), (-0.0049, 0.0151), (0.0283, 0.0447))
+    found = stretches(try_waypoints(path, "seam", walled(thin(*walls)), CONFIG)[1])
+    assert len(found) == 3
+    for one, wall in zip(found, walls, strict=True):
+        assert_covers(one, path, wall, within=0.001 + STEP)
+
+
 def test_a_wall_before_and_one_behind_poses_out_of_reach_are_told() -> None:
     """An arc that leads out of reach and back; the first failure is the wall before, and the place told is that wall's."""
     angle = np.linspace(np.pi - 0.5, 2 * np.pi + 0.5, 900)

@@ -16,6 +16,7 @@ from weldsim.dryrun.run import dry_run
 from weldsim.dryrun.verdict import DryRun, Trial, Verdict, dry_run_json
 from weldsim.motion.collision import NEAR
 from weldsim.motion.config import MotionConfig
+from weldsim.records import Segment
 from weldsim.scene.config import FixtureConfig, SceneConfig
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -90,3 +91,41 @@ def test_margins_are_told_where_a_motion_would_pass_alone(passed: DryRun, cell: 
     text = write_page(tmp_path / "page.html", failed).read_text()
     assert ">WOULD FAIL</div>" in text
     assert "Clearance and margins" not in text
+
+
+def test_a_job_that_passes_shows_no_singularity_beyond_its_limit_though_the_way_home_leads_through_one(
+    passed: DryRun, cell: Cell
+) -> None:
+    trial = passed.trials[0]
+    assert trial.trajectory is not None
+    air = np.array([one == Segment.AIR for one in trial.trajectory.segments])
+    q = trial.q.copy()
+    q[np.flatnonzero(air)[-1], 4] = 0.0  # wrist 2 straight: singular
+    figure = "least tip travel for a turn of the joints"
+    (before, after) = (
+        next(one for one in margins(each, cell, MotionConfig()) if one.figure == figure) for each in (trial, replace(trial, q=q))
+    )
+    assert after == before
+    q[np.flatnonzero(~air)[5], 4] = 0.0
+    worst = next(one for one in margins(replace(trial, q=q), cell, MotionConfig()) if one.figure == figure)
+    assert worst.value < worst.limit
+    assert worst.t == trial.t[np.flatnonzero(~air)[5]]
+
+
+@pytest.mark.parametrize("off", [0.0, 0.012])
+def test_a_weld_that_lies_off_the_parts_seam_is_asked_about(cell: Cell, off: float) -> None:
+    """Of another part, or over where the part stood before."""
+    (seam,) = cell.seams
+    path = torch_path(seam[::20] + np.array([0.0, 0.0, off]), DOWN)
+    program = Program(source="test", kind="path", paths=(path,), names=("seam-1",))
+    notes = dry_run(program, cell, MotionConfig(), fix=False).notes
+    assert [note for note in notes if "nearest seam" in note] == (
+        []
+        if not off
+        else [
+            f"seam-1 lies up to 12 mm off the nearest seam of the part in {cell.name}: is it that part's, and does the"
+            " part stand there?"
+        ]
+    )
+    moved = cell.moved(np.array([0.0, 0.05, 0.0]))
+    assert np.allclose(moved.seams[0] - seam, [0.0, 0.05, 0.0])

@@ -13,7 +13,7 @@ from weldsim.dryrun.cell import Cell, empty_cell
 from weldsim.dryrun.path_faults import turns_back
 from weldsim.dryrun.read import read_program
 from weldsim.dryrun.run import dry_run
-from weldsim.dryrun.scatter import refit, scatter_of
+from weldsim.dryrun.scatter import is_even, nearest_in_order, refit, scatter_of
 from weldsim.dryrun.verdict import Trial
 from weldsim.dryrun.waypoints import try_waypoints
 from weldsim.frames import Transform
@@ -94,6 +94,27 @@ def test_a_curve_leaves_the_waypoints_by_their_scatter_and_comes_nearer_to_the_t
     assert max(ratios) < 0.95
 
 
+@pytest.mark.parametrize("count", [200, 1000, 5000])
+@pytest.mark.parametrize("scatter", [3e-4, 1e-3])
+def test_waypoints_closer_than_they_scatter_do_not_lead_the_curve_forth_and_back(count, scatter) -> None:
+    path, truth = waypoints(count, seed=5, position=scatter), waypoints(600)
+    found = scatter_of(path)
+    assert found.position == pytest.approx(scatter, rel=0.2)
+    fitted = refit(path, found)
+    assert fitted.path.s[-1] == pytest.approx(truth.s[-1], rel=0.02)
+    off = project(fitted.path.X_BT.p, truth.X_BT.p)[0]
+    assert np.sqrt(np.mean(off**2)) < 0.9 * scatter  # of each axis; the waypoints lie 1.4 times that off
+    travel = np.diff(fitted.path.X_BT.p[:, 0])
+    assert travel.min() > 0
+
+
+@pytest.mark.parametrize("values", [np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.5, 0.5, 2.0])])
+def test_the_nearest_of_rising_values_is_that_of_all(values) -> None:
+    at = np.linspace(-0.3, 3.4, 38)
+    found = nearest_in_order(values, at)
+    assert np.abs(values[found] - at) == pytest.approx(np.abs(values[:, None] - at).min(axis=0))
+
+
 def test_noisy_waypoints_that_the_arm_can_weld_pass_and_the_scatter_is_told(empty: Cell) -> None:
     """At the speed at which they are followed as they are, nothing is fitted; at a higher one the motion is a smooth curve."""
     slow = waypoints(40, seed=3, position=1.5e-4, rotation=1.5e-2)
@@ -167,6 +188,50 @@ def test_travel_that_turns_back_is_called_that_each_time(empty: Cell, scatter) -
     # The advice, followed.
     assert not turns_back(path)
     assert try_waypoints(shuffled(path, list(range(30))), "in order", empty, CONFIG)[1].passed
+
+
+@pytest.mark.parametrize("legs", [1, 2, 3, 8])
+@pytest.mark.parametrize("wide", [5e-4, 3e-3])
+def test_a_weave_is_no_scatter_and_is_not_flattened(empty: Cell, legs, wide) -> None:
+    """Waypoints at its corners, or some on each leg."""
+    u = np.arange(80 * legs + 1) / legs
+    across = wide * (2 * np.abs((u + 0.5) % 2 - 1) - 1)
+    points = np.stack([0.002 * u - 0.08, -0.45 + across, np.full(len(u), 0.1)], axis=1)
+    straight = torch_path(points * [1.0, 0.0, 1.0] + [0.0, -0.45, 0.0], DOWN, speed=0.002)
+    weave = replace(straight, X_BT=Transform("BT", straight.X_BT.R, points), s=arc_length(points), roll_free=False)
+    assert scatter_of(weave).position < 0.15 * wide
+    assert not is_even(weave)
+    if legs == 1:
+        followed, _ = try_waypoints(weave, "weave", empty, CONFIG)
+        assert project(points, followed.X_BT.p)[0].max() < 0.1 * wide
+
+
+@pytest.mark.parametrize("count", [200, 1000, 5000])
+@pytest.mark.parametrize("scatter", [0.0, 2e-5, 1e-4, 3e-4, 1e-3])
+def test_travel_back_among_waypoints_that_scatter_is_called_that_and_scatter_alone_is_not(count, scatter) -> None:
+    """38 mm back over itself, found where it is to the length that tells the direction of travel."""
+    rng, middle, back = np.random.default_rng(count), count // 2, count // 8
+    order = [*range(middle), *range(middle, middle - back, -1), *range(middle - back, count)]
+    exact = waypoints(count)
+    points, step = exact.X_BT.p, float(exact.s[1])
+
+    def scattered(order: list[int]) -> TorchPath:
+        p = points[order] + scatter * rng.normal(size=(len(order), 3))
+        return replace(
+            exact,
+            X_BT=Transform("BT", exact.X_BT.R[order], p),
+            s=arc_length(p),
+            speed=exact.speed[order],
+            arc_on=exact.arc_on[order],
+            segments=tuple(exact.segments[i] for i in order),
+        )
+
+    path = scattered(order)
+    found = turns_back(path)
+    assert len(found) == 2
+    for fault, place in zip(found, (middle, middle - back), strict=True):
+        assert np.linalg.norm(path.X_BT.p[fault.index] - points[place]) < 14 * scatter + step
+    assert turns_back(scattered([*range(count)])) == []
 
 
 @pytest.mark.parametrize("angle", [60, 120, 160])

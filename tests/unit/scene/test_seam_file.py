@@ -121,3 +121,9 @@ def test_a_unit_in_a_comment_brackets_and_marks_between_thousands(tmp_path: Path
         "x [um];y [um];z [um]\n" + "\n".join(["-115.000,0;0,0;20.500,0", "0,0;500,0;20.000,0", "115.000,0;1.250,0;19.500,0"]),
     ):
         np.testing.assert_allclose(read(tmp_path / "s.csv", text).points, POINTS * 1e-3, atol=1e-12)
+
+
+def test_a_column_that_tells_lines_apart_is_named_and_without_it_the_file_is_read(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"column 'Seam' tells lines apart; a part has one seam"):
+        read(tmp_path / "a.csv", "x,y,z,Seam\n0,0,0,1\n1,0,0,1\n0,1,0,2\n1,1,0,2\n")
+    assert len(read(tmp_path / "a.csv", "x,y,z\n0,0,0\n1,0,0\n").points) == 2

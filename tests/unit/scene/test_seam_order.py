@@ -125,3 +125,14 @@ def test_sorting_them_as_the_message_says_is_enough() -> None:
     with pytest.raises(SceneError, match="sort them"):
         check_order(FILE, bad)
     check_order(FILE, bad[bad[:, 0].argsort()])
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_several_lines_in_one_file_are_told_and_one_of_them_is_taken(count: int) -> None:
+    lines = [line() + np.array([0.0, 0.03 * k, 0.0]) for k in range(count)]
+    with pytest.raises(
+        SceneError, match=rf"its points make {count} lines, the second from point 41 on, .*; keep one line"
+    ) as caught:
+        check_order(Path("seam.csv"), np.vstack(lines))
+    assert caught.value.data["points"] == (40, 41)
+    check_order(Path("seam.csv"), lines[0])

@@ -1,5 +1,6 @@
 """One's own part behaves as a built-in one of the same shape; files that cannot be used are refused in one line."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -133,6 +134,21 @@ def refused(config: MeshConfig) -> str:
     return str(caught.value)
 
 
+@pytest.mark.parametrize(("drawn", "said"), [("mm", "m"), ("m", "mm"), ("cm", "m"), ("in", "m"), ("inch", "cm")])
+def test_a_part_in_another_unit_is_told_the_units_that_make_it_one_and_they_do(tmp_path: Path, drawn: str, said: str) -> None:
+    metres = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "inch": 0.0254}
+    box = trimesh.creation.box(np.array([0.9, 0.1, 0.02]) / metres[drawn])
+    box.export(tmp_path / "part.stl")
+    config = MeshConfig(file=str(tmp_path / "part.stl"), units=said)  # type: ignore[arg-type]
+    if 0.005 <= 0.9 / metres[drawn] * metres[said] <= 2.0:
+        assert make_user_mesh(config)
+        return
+    told = re.findall(r"'(\w+)'", refused(config).partition("state units")[2])
+    assert drawn.removesuffix("ch") in told
+    for unit in told:
+        assert make_user_mesh(replace(config, units=unit))
+
+
 def test_meshes_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
     good = written(tmp_path, built_in("straight"))
     assert "looks like millimetres; state units = 'mm'" in refused(replace(good, units="m"))
@@ -226,9 +242,9 @@ def test_a_scene_says_which_part_it_has(tmp_path: Path) -> None:
         make_workpiece(SceneConfig(workpiece="mesh"))
     with pytest.raises(SceneError, match="write workpiece"):
         make_workpiece(SceneConfig(mesh=MeshConfig(file="a.stl", units="mm")))
-    with pytest.raises(ConfigError, match=r"units. is missing: one of m, cm, mm, inch"):
+    with pytest.raises(ConfigError, match=r"units. is missing: one of m, cm, mm, in, inch"):
         structure({"workpiece": "mesh", "mesh": {"file": "a.stl"}}, SceneConfig)
-    with pytest.raises(ConfigError, match="not one of m, cm, mm, inch"):
+    with pytest.raises(ConfigError, match="not one of m, cm, mm, in, inch"):
         structure({"workpiece": "mesh", "mesh": {"file": "a.stl", "units": "furlong"}}, SceneConfig)
     with pytest.raises(ConfigError, match="seem"):
         structure({"workpiece": "mesh", "mesh": {"file": "a.stl", "units": "mm", "seem": "a.csv"}}, SceneConfig)

@@ -50,5 +50,5 @@ def test_the_way_on_can_be_followed_and_leaves_no_gap() -> None:
     again = way_on(["weldsim"], far(0.12), PATH, Path("runs/my job-from-69"))
     assert again.endswith("--from '120 mm' --out 'runs/my job-from-120'")
     assert "too little" in way_on(["weldsim"], far(END - 0.001), PATH, Path("out"))
-    begun = way_on(["weldsim"], far(0.064, welded=0.0), PATH, Path("out"), "69 mm")
+    begun = way_on(["weldsim"], far(0.064, welded=0.0), PATH, Path("out"), 0.069)
     assert begun == "nothing of it is welded; to weld it: weldsim --from '69 mm' --out out"

@@ -1,6 +1,6 @@
 """Flat plates: one with a straight or curved groove, and a plain one that has no seam."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -13,6 +13,8 @@ from weldsim.scene.workpieces.base import Box, ClampPlace, LabelledMesh, SeamCur
 from weldsim.scene.workpieces.centre_line import CentreLine, CentreLineConfig, make_centre_line
 from weldsim.scene.workpieces.groove import GrooveConfig, GrooveSection, make_section
 from weldsim.scene.workpieces.solid import ABOVE, SWEEP_STEP, Surface, block, cut, extrude, sweep
+
+GROWING = 1.15 ** np.arange(30)  # times the least radius: radii that are tried in the place of one that is too small
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,7 @@ def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: Cen
     if line.smallest_radius <= section.width / 2:
         raise SceneError(
             f"centre line: radius {line.smallest_radius * 1e3:g} mm is under half the groove's width {section.width * 1e3:g} mm;"
-            f" use more than {section.width * 500:g} mm",
+            f" {_radius_that_fits(plate, groove, centre_line, section.width / 2)}",
             key="radius",
             limit=section.width / 2,
         )
@@ -229,6 +231,20 @@ def make_groove_plate(plate: PlateConfig, groove: GrooveConfig, centre_line: Cen
             limit=plate.width / 2,
         )
     return part
+
+
+def _radius_that_fits(plate: PlateConfig, groove: GrooveConfig, centre_line: CentreLineConfig, least: Metre) -> str:
+    """Which radius of the line is wide enough, and leaves the groove on the plate, in words. Args: least, it must be over [m]."""
+    for radius in np.ceil(least * 1e3 + 0.5) * 1e-3 * GROWING:
+        bent = replace(centre_line, radius=float(np.round(radius, 3)))
+        try:
+            if make_centre_line(bent, plate.length).smallest_radius <= least:
+                continue
+            make_groove_plate(plate, groove, bent)
+        except SceneError:
+            continue
+        return f"use {1e3 * np.round(radius, 3):.0f} mm or more"
+    return "make the groove narrower, or bend the line less"
 
 
 def check_depth(section: GrooveSection, plate: PlateConfig) -> None:

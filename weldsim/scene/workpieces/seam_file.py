@@ -30,6 +30,7 @@ UNNAMED = {3: AXES, 4: (*AXES, "width"), 6: COLUMNS[:6], 7: COLUMNS}
 MOST = 100_000  # lines
 _BRACKETED = re.compile(r"^\s*[\[({]+([-+.\d\s,;eE]+)[\])}]+\s*[,;]?\s*$")  # a point as Python and others print it
 UNIT_LENGTH = 0.25  # by which normals without names may be off 1: rotation vectors look like them
+LABELS = ("seam", "line", "curve", "weld", "segment", "part", "polyline", "path", "seam_id", "line_id", "group")
 WANTED = "wanted are x, y, z, and perhaps nx, ny, nz and width"
 
 
@@ -142,6 +143,12 @@ def _named(path: Path, names: tuple[ColumnName, ...]) -> dict[str, int]:
         found = by_role(names)
     except ValueError:
         found = {}
+    if found and (label := next((one.text for one in names if one.role is None and one.text.strip().lower() in LABELS), "")):
+        raise SceneError(
+            f"{path}: column {label!r} tells lines apart; a part has one seam: keep the rows of one, and its x, y, z",
+            path=str(path),
+            allowed=COLUMNS,
+        )
     roles = [name.role for name in names if name.role not in ("other", "red", "green", "blue")]
     if not found or None in roles or len(set(roles)) < len(roles) or len(set(NORMALS) & set(roles)) not in (0, 3):
         raise SceneError(f"{path}: columns {listed!r}; {WANTED}", path=str(path), allowed=COLUMNS)

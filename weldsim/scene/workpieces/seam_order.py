@@ -1,5 +1,6 @@
 """Whether the points of a seam file are in order along the seam: shuffled ones make a line that jumps and turns back."""
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from weldsim.quantity import Metre
 TURN = np.cos(np.radians(120))  # of a line from one point to the next: no torch follows a sharper one
 LEAST: Metre = 0.5e-3  # steps shorter than this may be noise of who measured the points
 FAR = 4.0  # times the usual step: a jump
+MOST_LINES = 20  # that are told apart
 NEXT = 2.0  # times the usual step: a point so near is a neighbour on the seam
 
 
@@ -28,6 +30,7 @@ def check_order(path: Path, points: Float[ndarray, "n 3"]) -> None:
     length = np.linalg.norm(steps, axis=1)
     if len(points) < 3:
         return
+    _refuse_several(path, points, steps, length)
     turn = np.einsum("ij,ij->i", unit(steps[1:]), unit(steps[:-1]))
     back = np.flatnonzero((turn < TURN) & (np.minimum(length[1:], length[:-1]) > LEAST))
     if len(back):
@@ -46,6 +49,35 @@ def check_order(path: Path, points: Float[ndarray, "n 3"]) -> None:
         k = int(apart.argmin())
         if 0 < apart[k] < NEXT * usual:  # a ring that closes ends where it begins
             raise _out_of_order(path, points, int(jumps[0]), f"and point {k + 1} is {1e3 * apart[k]:.1f} mm from point {i + 1}")
+
+
+def _refuse_several(path: Path, points: Float[ndarray, "n 3"], steps: Float[ndarray, "m 3"], length: Float[ndarray, "m"]) -> None:
+    """Raises SceneError where the points are of several lines one behind the other: each in order, and apart from the others."""
+    usual = float(np.median(length))
+    jumps = np.flatnonzero((length > FAR * usual) & (length > LEAST))
+    runs = np.split(np.arange(len(points)), jumps + 1)
+    if not 1 <= len(jumps) <= MOST_LINES or min(map(len, runs)) < 3:
+        return
+    turn = np.einsum("ij,ij->i", unit(steps[1:]), unit(steps[:-1]))
+    inside = np.ones(len(turn), bool)
+    for jump in jumps:
+        inside[max(jump - 1, 0) : jump + 1] = False
+    if (turn[inside] < TURN).any():
+        return
+    for one, other in combinations(runs, 2):
+        apart = np.linalg.norm(points[one][:, None] - points[other][[0, -1]][None], axis=2).min()
+        if apart < NEXT * usual:  # parts of one line, in another order
+            return
+    turned = [jump for jump in jumps if (turn[max(jump - 1, 0) : jump + 1] < TURN).any()]
+    if turned:
+        first = int(turned[0])
+        raise SceneError(
+            f"mesh.seam {path}: its points make {len(runs)} lines, the second from point {first + 2} on,"
+            f" {1e3 * length[first]:.1f} mm away: a part has one seam; keep one line in the file",
+            path=str(path),
+            key="seam",
+            points=(first + 1, first + 2),
+        )
 
 
 def _ends(jumps: Int[ndarray, "j"], count: int) -> list[int]:

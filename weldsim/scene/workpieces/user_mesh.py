@@ -19,10 +19,12 @@ from weldsim.scene.workpieces.seam_order import check_order
 from weldsim.scene.workpieces.solid import SWEEP_STEP
 from weldsim.scene.workpieces.triangles import column_runs, distance_to_faces, ray_lengths
 
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254}
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "inch": 0.0254}
+NAMES = {"mm": "millimetres", "cm": "centimetres", "in": "inches", "m": "metres"}
 READING = "mesh file/2"  # change it when files are read otherwise, so that kept meshes of old readings are left alone
 SHORTEST = 0.01  # of the part's longest side: a shorter seam must be in another unit
 LARGEST, SMALLEST = 2.0, 0.005  # [m] of a part's longest side: beyond, its unit must be wrong
+USUAL = 0.02  # [m] of a part in the unit that is proposed, at least
 NEAR = 0.010  # [m] a seam of unknown width may be so far from the part's surface
 EVERY = 4  # samples of a seam between looks at the surface beside it
 COLUMNS = 24  # of boxes to collide with, along the part's longer side
@@ -39,7 +41,7 @@ class MeshConfig:
     """
 
     file: str
-    units: Literal["m", "cm", "mm", "inch"]
+    units: Literal["m", "cm", "mm", "in", "inch"]
     seam: str | None = None
 
 
@@ -163,10 +165,15 @@ def _check_size(path: Path, vertices: Float[ndarray, "v 3"], units: str) -> None
     size = float(np.ptp(vertices, axis=0).max())
     if SMALLEST <= size <= LARGEST:
         return
-    guess = "millimetres" if size > LARGEST else "metres"
+    sizes = {name: size / METRES[units] * METRES[name] for name in NAMES}
+    fits = {name: length for name, length in sizes.items() if USUAL <= length <= LARGEST}
+    advice = "look at the file"
+    if len(fits) == 1:
+        advice = f"looks like {NAMES[next(iter(fits))]}; state units = {next(iter(fits))!r}"
+    elif fits:
+        advice = "state units = " + " or ".join(f"{name!r} ({1e3 * length:.4g} mm long)" for name, length in fits.items())
     raise SceneError(
-        f"mesh.file {path}: is {size:.4g} m long with units = {units!r}, must be {SMALLEST:g} to {LARGEST:g} m: looks like {guess};"
-        f" state units = {'mm' if size > LARGEST else 'm'!r}",
+        f"mesh.file {path}: is {size:.4g} m long with units = {units!r}, must be {SMALLEST:g} to {LARGEST:g} m: {advice}",
         path=str(path),
         key="units",
         limit=(SMALLEST, LARGEST),
