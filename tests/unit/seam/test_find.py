@@ -1,6 +1,7 @@
 """The whole default finder on clouds with a known groove: accuracy, ends, phantoms, several grooves, poor clouds."""
 
 import inspect
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from tests.clouds import GROOVE, GrooveCloud, d415_depth, groove_cloud
 from tests.clouds import two_grooves as made_two_grooves
 from weldsim.cloud.filters import voxel_grid
+from weldsim.cloud.merge import merge
 from weldsim.curves import project
 from weldsim.records import KnownSeam, PointCloud, Seam
 from weldsim.seam.config import ProfileConfig, SeamConfig
@@ -84,6 +86,23 @@ def test_a_groove_along_the_image_has_its_width_and_depth(width: float, depth: f
     assert error(seam, truth).p95 < 0.1e-3
     assert seam.width == pytest.approx(width * 1e-3, abs=1.5e-4)
     assert seam.depth == pytest.approx(depth * 1e-3, abs=1.0e-4)
+
+
+@pytest.mark.parametrize(("width", "depth"), [(6, 3.43), (14, 8), (20, 12)])
+@pytest.mark.parametrize("noise", [0.0, 1.5e-4])
+def test_a_groove_that_two_views_show_has_its_width_and_depth(width: float, depth: float, noise: float) -> None:
+    """A sharp sensor's; each view puts the bottom where its sight lines meet the plate, one to the left and one to the right."""
+    rng = np.random.default_rng(0)
+    first, second = (
+        groove_cloud(rng, width=width * 1e-3, depth=depth * 1e-3, camera_tilt=0.25, camera_azimuth=azimuth, table=False)
+        for azimuth in (1.2, -1.6)
+    )
+    both = merge([first.cloud, second.cloud])
+    both = replace(both, points=both.points + noise * rng.standard_normal(both.points.shape))
+    seam, truth = only_seam(first._replace(cloud=both))
+    assert error(seam, truth).p95 < 0.2e-3
+    assert seam.width == pytest.approx(width * 1e-3, abs=3e-4)
+    assert seam.depth == pytest.approx(depth * 1e-3, abs=2e-4)
 
 
 @pytest.mark.parametrize("width", [6, 8, 10, 14, 19, 25])

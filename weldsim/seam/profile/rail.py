@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.spatial import KDTree
 
@@ -49,6 +49,10 @@ class Strip:
     h: Float[ndarray, "k"]
     slope: Float[ndarray, "k 2"]
     above: Float[ndarray, "k"]
+
+    def select(self, chosen: Bool[ndarray, "k"]) -> "Strip":
+        """The chosen points."""
+        return Strip(*(values[chosen] for values in (self.station, self.s, self.x, self.h, self.slope, self.above)))
 
 
 def make_rail(points: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], step: float, extend: float = 0.0) -> Rail:

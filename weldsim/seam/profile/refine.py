@@ -1,6 +1,7 @@
 """One candidate groove, from a coarse line to a fitted one: rail, parent surface, cross-section, lateral track."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import cv2
@@ -28,6 +29,7 @@ AT_AN_END = 0.003  # [m] before the end of its rail a groove goes on, for all on
 MOST_LOOKS = 3
 FEWEST_STATIONS = 12  # fewer say nothing about a groove
 MOST_TURNS = 6
+MOST_VIEWS = 8
 STEEP = 0.9  # [rad] that the two sides may differ before the rail stands upright on the parent surface
 WIDEST_FOOTPRINT = 1.2  # of the camera's window on a surface seen at 35 deg, over one that faces it
 SETTLED = (2e-4, 5e-4)  # [m] a rail that moves less than this is done: without noise, and where cells have as much or more
@@ -57,6 +59,25 @@ class Surroundings:
     def along(self, rail: Rail) -> Strip:
         """Each point in a rail's coordinates."""
         return lay_out(rail, self.points, self.origins)
+
+    @cached_property
+    def of_most_seen_view(self) -> Bool[ndarray, "n"] | None:
+        """The points of the view that shows most of them; None where all are of one view, or of more than MOST_VIEWS."""
+        if self.origins is None or len(self.origins) == 0 or self.origins.strides[0] == 0:
+            return None
+        left, most = np.arange(len(self.origins)), np.empty(0, np.int64)
+        for _ in range(MOST_VIEWS):
+            same = (self.origins[left] == self.origins[left[0]]).all(axis=1)
+            if np.count_nonzero(same) > len(most):
+                most = left[same]
+            left = left[~same]
+            if len(left) <= len(most):
+                break
+        if len(left) > len(most) or len(most) == len(self.origins):
+            return None
+        out = np.zeros(len(self.origins), bool)
+        out[most] = True
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,14 +263,18 @@ def _measure(
     blur = start.blur * WIDEST_FOOTPRINT
     inner = 0.5 * start.width + 0.7 * blur + 0.001
     parent = fit_parent(rail, strip, inner, inner + config.side_band, NEAR_RAIL)
-    grid = make_grid(rail, strip, parent, 0.5 * start.width + blur + 0.006)
+    half, one = 0.5 * start.width + blur + 0.006, around.of_most_seen_view
+    grid = make_grid(rail, strip, parent, half)
     start = replace(start, step=parent.hilo)
     flanked = sided(parent, config)
-    blocks = mean_blocks(grid, flanked, start)
+    # Without noise the section shows where each view puts its bottom, which is another place than in the next view's picture.
+    shape = grid if one is None else make_grid(rail, strip.select(one), parent, half)
+    blocks = mean_blocks(shape, flanked, start)
     if blocks is None or not agree(blocks, start.depth):
-        # A camera's noise outweighs where its points lie in the cells; only without it do cells' places tell walls from blur.
+        # A camera's noise outweighs that, and where its points lie in the cells; all views together are the least noisy.
         grid = grid.centred()
-    section, doubt = _fit_grid(grid, flanked, parent.noise, start, stage)
+        shape = grid
+    section, doubt = _fit_grid(shape, flanked, parent.noise, start, stage)
     track = follow(grid, section, flanked, attached(parent), generalised=stage == "settled")
     section = replace(section, middle=0.0)
     if np.count_nonzero(track.weight) < FEWEST_STATIONS:

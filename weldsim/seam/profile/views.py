@@ -13,6 +13,8 @@ REACHES = (0.001, 0.002, 0.003, 0.004, 0.0055, 0.0075, 0.0105)  # [m] correlatio
 SHARPNESS = 2.0  # with which a worse correlation length counts less
 USUAL_REACH = 0.0035  # [m] where there is too little to tell
 QUIETEST = (1e-4, 2e-4)  # [m] least standard deviation of a cell: of blocks that agree to that, and of any others
+AGREEING = 0.9  # of the cells in the groove: where a view ends, a wall may be missing
+INSIDE = 0.1  # of the groove's depth
 WHITE = 0.2  # of the noise's variance, at least, is taken as independent from cell to cell: cells are no exact means
 PARENT = 0.4  # error of the parent surface, level and tilt, over the noise of a cell
 
@@ -82,13 +84,19 @@ def gather(blocks: Blocks, depth: float, noise: float) -> Views:
 
 
 def agree(blocks: Blocks, depth: float) -> bool:
-    """Whether the blocks show one section to within QUIETEST: an exact sensor's, not a noisy camera's.
+    """Whether the blocks show one section to within QUIETEST, but for a few cells: an exact sensor's, not a noisy camera's.
 
     Args:
         depth: of the groove, roughly [m].
     """
     of, known, middle = _grouped(blocks, depth)
-    return _least(np.nan_to_num(np.where(known, blocks.depth, np.nan) - middle[of]), known) < QUIETEST[1]
+    if len(of) < FEWEST_BLOCKS:
+        return False
+    with np.errstate(invalid="ignore"):
+        inside = known & (middle[of] > INSIDE * depth)  # a camera that counts in steps shows plates without noise, but no groove
+    off = np.sort(np.abs(blocks.depth - middle[of])[inside])
+    most = off[: int(np.ceil(AGREEING * len(off)))]
+    return len(most) > 0 and float(np.sqrt((most * most).mean())) < QUIETEST[1]
 
 
 def _grouped(blocks: Blocks, depth: float) -> tuple[Int[ndarray, "b"], Bool[ndarray, "b w"], Float[ndarray, "g w"]]:
