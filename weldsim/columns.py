@@ -35,6 +35,7 @@ _GROUPED = re.compile(
     re.MULTILINE,
 )
 _MARKS = {"point": re.compile(r"\."), "comma": re.compile(","), "blank": re.compile("[ \u00a0\u202f'\u2019]")}
+_DOUBLE = re.compile(r"(?<=[\d.])[dD](?=[-+]\d)")  # exponent of a Fortran double
 _QUOTED = re.compile(r'"([^"\n]*)"')
 _PLACE = "positions?|pos|points?|pts?|p|coordinates?|coords?|koordinaten?|coord|vertex|vertices|locations?|loc"
 _PLACES = re.compile(
@@ -125,18 +126,18 @@ def utf_16(data: bytes) -> str | None:
     return None
 
 
-def without_thousands(text: str) -> str:
-    """The text with numbers such as 1.234,567 or 1,234.567 as 1234,567 and 1234.567.
+def plain_numbers(text: str) -> str:
+    """The text with numbers such as 1.234,567 or 1,234.567 as 1234,567 and 1234.567, and Fortran's 1.5D-03 as 1.5e-03.
 
-    Only between semicolons, tabs or quotes, where a comma parts no columns, and only where a number has both marks, or groups
-    parted by blanks or apostrophes, so that no other reading is left.
+    Marks between thousands are taken out only between semicolons, tabs or quotes, where a comma parts no columns, and only
+    where a number has both marks, or groups parted by blanks or apostrophes, so that no other reading is left.
     """
 
     def plain(found: re.Match[str]) -> str:
         around = text[max(found.start() - 1, 0) : found.start()] + text[found.end() : found.end() + 1]
         return _MARKS[found.lastgroup or ""].sub("", found[0].strip(" ")) if any(mark in around for mark in ';\t"') else found[0]
 
-    return _GROUPED.sub(plain, text)
+    return _DOUBLE.sub("e", _GROUPED.sub(plain, text))
 
 
 def unit_of_comments(lines: Sequence[str]) -> str | None:

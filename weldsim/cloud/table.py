@@ -21,10 +21,11 @@ from weldsim.columns import (
     decode,
     find_table,
     is_number,
+    plain_numbers,
     unit_of_comments,
-    without_thousands,
 )
 
+_DOUBLE = re.compile(rb"(?<=[0-9.])[dD](?=[-+][0-9])")  # exponent of a Fortran double
 _HEAD = 1 << 20  # bytes in which the first row is looked for
 _SAMPLE = 1 << 17  # bytes in which marks between thousands are looked for
 _DIGITS = b"0123456789+-.eE,; \t\r\n"
@@ -53,7 +54,7 @@ def parse_table(
     """
     if not text.strip():
         raise Unreadable("its header promises points, none follow")
-    text = plain_nans(text)
+    text = plain_cells(text)
     if delimiter is None and b"," in text:  # decimal ones: white space parts
         text = text.replace(b",", b".")
     used = range(columns) if isinstance(columns, int) else columns
@@ -68,9 +69,12 @@ def parse_table(
     return table
 
 
-def plain_nans(data: bytes) -> bytes:
-    """The text with `nan` in place of other spellings of no number: Visual C++'s `-nan(ind)` and `1.#QNAN`, NA, null, none."""
+def plain_cells(data: bytes) -> bytes:
+    """The text with `nan` in place of other spellings of no number: Visual C++'s `-nan(ind)` and `1.#QNAN`, NA, null, none;
+    and with e for the D of Fortran's exponents."""
     letters = data.translate(None, _DIGITS)  # almost nothing: far quicker than to look through all of it
+    if b"D" in letters or b"d" in letters:
+        data = _DOUBLE.sub(b"e", data)
     return _NO_NUMBER.sub(b"nan", data) if re.search(rb"nan\(|#|n/?a|null|non", letters, re.IGNORECASE) else data
 
 
@@ -90,7 +94,7 @@ def read_text(data: bytes) -> RawCloud:
         raise Unreadable("it is binary, and no PLY, PCD, NPZ or NPY")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    data = _ungrouped(plain_nans(data))
+    data = _ungrouped(plain_cells(data))
     lines = _head(data)
     table = find_table(lines)
     if table is None and _BRACKETED.match(data) is not None:  # as Python prints lists, or between bars
@@ -119,9 +123,9 @@ def read_text(data: bytes) -> RawCloud:
 def _ungrouped(data: bytes) -> bytes:
     """The text without marks between thousands, where its first rows have some."""
     head = data[:_SAMPLE]
-    if not any(mark in head for mark in (b";", b"\t", b'"')) or without_thousands(decode(head)) == decode(head):
+    if not any(mark in head for mark in (b";", b"\t", b'"')) or plain_numbers(decode(head)) == decode(head):
         return data
-    return without_thousands(decode(data)).encode()
+    return plain_numbers(decode(data)).encode()
 
 
 def _head(data: bytes) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.columns import AXES, UNITS, ColumnName, TextTable, find_table, is_comment, is_number, read_name, without_thousands
+from weldsim.columns import AXES, UNITS, ColumnName, TextTable, find_table, is_comment, is_number, plain_numbers, read_name
 from weldsim.errors import InputError
 from weldsim.frames import matrix_from_quaternion, matrix_from_rotation_vector, rotation_vector_from_matrix
 from weldsim.records import MILLIMETRE_SPAN
@@ -55,7 +55,7 @@ def read_poses(text: str, where: str) -> PoseTable:
         InputError: fewer than two rows, a row that is short or holds something else, names without a position and a rotation, a
             unit that leaves the pose open, numbers that are millimetres, degrees or joint angles.
     """
-    lines = [found[1] if (found := POSE.fullmatch(line)) else line for line in without_thousands(text).split("\n")]
+    lines = [found[1] if (found := POSE.fullmatch(line)) else line for line in plain_numbers(text).split("\n")]
     comments = " ".join(line for line in lines if is_comment(line))
     table = find_table(lines, least=len(WANTED))
     body = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]

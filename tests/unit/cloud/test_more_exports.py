@@ -11,7 +11,7 @@ from tests.cloud_files import ply_bytes, xyz_columns
 from weldsim.cloud.camera_files import read_camera
 from weldsim.cloud.files import read_cloud
 from weldsim.cloud.pose_files import read_pose
-from weldsim.columns import decode, unit_of_comments, utf_16, without_thousands
+from weldsim.columns import decode, plain_numbers, unit_of_comments, utf_16
 from weldsim.errors import CloudError, CloudFileError
 
 POINTS = np.round(np.random.default_rng(0).uniform(-1.4, 1.4, (150, 3)), 6)
@@ -53,7 +53,7 @@ def test_marks_between_thousands(read, thousands: str, decimal: str, between: st
 
 @pytest.mark.parametrize("line", ["1.234,5.678,9.012", "12 345 678.5", "1,234,567", "1.234;2.345;3.456", "1 234.5 2 345.6"])
 def test_marks_that_may_part_columns_are_left(line: str) -> None:
-    assert without_thousands(line) == line
+    assert plain_numbers(line) == line
 
 
 def test_row_and_column_before_a_scans_points_are_not_taken_for_x_and_y_and_the_advice_works(read) -> None:

@@ -9,6 +9,7 @@ from numpy import ndarray
 
 from tests.cloud_files import npy_bytes, npz_bytes
 from weldsim.cloud.files import read_cloud
+from weldsim.columns import plain_numbers
 from weldsim.errors import CloudFileError
 
 POINTS = np.random.default_rng(3).uniform([-0.1, 0.4, 0.01], [0.2, 0.7, 0.05], (150, 3)).round(6)
@@ -100,3 +101,11 @@ def test_where_the_camera_stood_is_read_as_pcl_writes_it(tmp_path: Path) -> None
 def test_the_rest_is_refused_for_what_it_is(read, data: bytes, words: str) -> None:
     with pytest.raises(CloudFileError, match=words):
         read(data)
+
+
+@pytest.mark.parametrize("letter", ["D", "d", "E"])
+@pytest.mark.parametrize("head", ["", "x y z\n", "# made by a Fortran program, in metres\n"])
+def test_fortrans_exponents(read, letter: str, head: str) -> None:
+    rows = [" ".join(f"{value:.6e}".replace("e", letter) for value in point) for point in POINTS]
+    np.testing.assert_allclose(read(head.encode() + text(rows)), POINTS, atol=1e-6)
+    assert plain_numbers("1.5D-03;-.2d+01;3D") == "1.5e-03;-.2e+01;3D"

@@ -20,8 +20,8 @@ from weldsim.columns import (
     find_table,
     is_comment,
     is_number,
+    plain_numbers,
     unit_of_comments,
-    without_thousands,
 )
 from weldsim.errors import SceneError
 
@@ -113,7 +113,7 @@ def _lines(path: Path) -> list[str]:
     text = decode(data)
     if "\0" in text:
         raise SceneError(f"mesh.seam {path}: is no text", path=str(path), key="seam")
-    lines = [_BRACKETED.sub(r"\1", line) for line in without_thousands(text).split("\n")]
+    lines = [_BRACKETED.sub(r"\1", line) for line in plain_numbers(text).split("\n")]
     if len(lines) > MOST:
         raise SceneError(f"mesh.seam {path}: {len(lines)} lines; at most {MOST} are read", path=str(path), limit=MOST)
     return lines
