@@ -54,8 +54,9 @@ class DryRunCommand(ConfigOptions):
     tool: Tool | None = None
     """Which frame the poses of a CSV or script are of: the wire's tip, or the bare flange. Default: what the file says."""
 
-    base: Base = "controller"
-    """In which base a CSV's poses are: the UR controller's, or base_link, which is turned half a turn about z."""
+    base: Base | None = None
+    """In which base a CSV's poses are: the UR controller's, or base_link, which is turned half a turn about z; by default what
+    the file says, else the controller's."""
 
     roll: bool = False
     """Leave the rotation about the wire of a CSV's poses free."""
@@ -145,14 +146,16 @@ class DryRunCommand(ConfigOptions):
 
     def _refuse_idle_options(self) -> None:
         """Raises InputError for an option that says what a file of this kind says itself."""
+        from weldsim.dryrun.read import TABLES
+
         kind = self.file.suffix.lower()
         if kind == ".json" and self.tool is not None:
             raise InputError(f"--tool {self.tool}: changes nothing here: poses of a {kind} path are the wire's tip")
-        if kind not in (".csv", ".txt") and self.base != "controller":
+        if kind not in TABLES and self.base == "base_link":
             raise InputError(
                 f"--base {self.base}: changes nothing here: it is for a CSV; poses of {kind or 'this'} are the controller's"
             )
-        if kind not in (".csv", ".txt", ".json") and self.roll:
+        if kind not in (*TABLES, ".json") and self.roll:
             raise InputError("--roll: changes nothing here: it is for the poses of a CSV")
 
     @property

@@ -7,7 +7,18 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.columns import AXES, UNITS, ColumnName, TextTable, find_table, is_comment, is_number, plain_numbers, read_name
+from weldsim.columns import (
+    AXES,
+    UNITS,
+    ColumnName,
+    TextTable,
+    find_table,
+    is_comment,
+    is_number,
+    plain_numbers,
+    read_name,
+    unit_of_comments,
+)
 from weldsim.errors import InputError
 from weldsim.frames import matrix_from_quaternion, matrix_from_rotation_vector, rotation_vector_from_matrix
 from weldsim.records import MILLIMETRE_SPAN
@@ -28,6 +39,10 @@ JOINT = re.compile(
     r"(?:actual_|target_)?(?:q|j|a|joint|axis|theta|gelenk|achse)[ _.:-]?\d(?:[ _](?:deg|rad))?"
     r"|base|shoulder(?:[ _].*)?|elbow(?:[ _].*)?|wrist.*"
 )
+MOTION = re.compile(  # columns that say how a robot is to move or weld
+    r"(?:travel|weld|welding|torch|tcp|tool|lin|linear)?[ _-]*(?:speed|velocity|vel|feed(?:[ _-]?rate)?|acc|acceleration|geschwindigkeit)"
+    r"|v|a|f|arc(?:[ _-]?on)?|weld(?:ing)?(?:[ _-]?on)?|blend(?:[ _-]?radius)?|zone|dwell|wait|wire(?:[ _-]?feed)?|current|voltage"
+)
 IN_METRES = ("", "m", "rad", "radian", "radians", "m/s", "s")
 DEGREES = ("deg", "degree", "degrees", "\u00b0")
 
@@ -35,12 +50,13 @@ DEGREES = ("deg", "degree", "degrees", "\u00b0")
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PoseTable:
     """Attributes: poses, in order, as UR writes them [m, rad]; labels, of the seam of each, None where no column names it;
-    comments, all of them; note, what the reader was not sure of, or ""."""
+    comments, all of them; note, what the reader was not sure of, or ""; ignored, columns that say how to move or weld."""
 
     poses: Float[ndarray, "n 6"]
     labels: tuple[str, ...] | None
     comments: str
     note: str = ""
+    ignored: tuple[str, ...] = ()
 
 
 def read_poses(text: str, where: str) -> PoseTable:
@@ -86,6 +102,7 @@ def read_poses(text: str, where: str) -> PoseTable:
         labels=None if label is None else tuple(labels),
         comments=comments,
         note=note if near > OUT_OF_REACH else "",
+        ignored=tuple(name.text for name in table.names or () if MOTION.fullmatch(_bare(name).strip(" _-"))),
     )
 
 
@@ -96,6 +113,7 @@ def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> N
     worst = int((far if distant else turn).argmax())
     at, value = f"{where}: line {lines[worst]}", float((far if distant else turn)[worst])
     needed = "x y z [m] and rx ry rz [rad] are needed"
+    named = "; or name the columns x [mm], y [mm], z [mm], rx, ry, rz in a first line"
     if distant and turn.max() > LONGEST_TURN:
         angles = float(np.abs(poses).max()) <= LARGEST_ANGLE
         what = "six joint angles in degrees, or millimetres and degrees" if angles else "millimetres and degrees"
@@ -103,7 +121,7 @@ def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> N
         raise InputError(f"{at}: {_said(poses[worst])}: looks like {what}; {needed}{advice}", line=lines[worst], value=value)
     if distant:
         raise InputError(
-            f"{at}: {value:.4g} m from the base (limit {FURTHEST:g} m): looks like millimetres; {needed}",
+            f"{at}: {value:.4g} m from the base (limit {FURTHEST:g} m): looks like millimetres; {needed}{named}",
             line=lines[worst],
             value=value,
         )
@@ -131,7 +149,8 @@ class _Column:
 def _columns(table: TextTable, lines: list[str], where: str) -> tuple[list[_Column], int | None]:
     """The columns of a pose, position first, and the one that names the seam, if there is one."""
     if table.names is None:
-        return [_Column(what, i) for i, what in enumerate(WANTED)], None
+        said = UNITS[unit_of_comments(lines) or "m"]
+        return [_Column(what, i, said if what in AXES else 1.0) for i, what in enumerate(WANTED)], None
     if table.doubled:
         raise InputError(f"{where}: twice as many columns as names: decimal commas need ; between the columns", path=where)
     found: dict[str, int] = {}
@@ -161,7 +180,7 @@ def _scale(wanted: str, table: TextTable, found: dict[str, int], lines: list[str
     """Metres or radians per unit of a column. Raises InputError for a unit that is neither, or leaves the pose open."""
     assert table.names is not None
     name = table.names[found[wanted]]
-    unit = _unit(name)
+    unit = _unit(name) or (unit_of_comments(lines[: table.first]) or "" if wanted in AXES else "")
     of_axes = {_unit(table.names[found[axis]]) for axis in AXES}
     if wanted in AXES and unit in UNITS and len(of_axes) == 1:
         return UNITS[unit]

@@ -28,7 +28,7 @@ def read_program(
     path: Path | str,
     *,
     tool: Tool | None = None,
-    base: Base = "controller",
+    base: Base | None = None,
     speed: MetrePerSecond = 0.008,
     roll_free: bool | None = None,
     q_start: Float[ndarray, "6"] | None = None,
@@ -39,7 +39,8 @@ def read_program(
         path: JSON, CSV or URScript, told by the suffix.
         tool: which frame a CSV's or script's poses are of; by default what the file says, else tool0 for a bare CSV (a robot
             program's own poses) and the torch for a script.
-        base: in which base a CSV's poses are; `base_link` is the controller's turned half a turn about z.
+        base: in which base a CSV's poses are; `base_link` is the controller's turned half a turn about z. By default what the
+            file says, else the controller's.
         speed: torch speed where the file names none [m/s].
         roll_free: whether the torch may turn about its wire; by default a path's may, a robot program's may not.
         q_start: where the arm stands [rad], for a script that asks.
@@ -81,12 +82,12 @@ def _refuse_others(path: Path) -> None:
         raise InputError(f"{path}: {wanted}", path=str(path))
 
 
-def _refuse_unused(path: Path, tool: Tool | None, base: Base, roll_free: bool | None) -> None:
+def _refuse_unused(path: Path, tool: Tool | None, base: Base | None, roll_free: bool | None) -> None:
     """Raises InputError for what a file of this kind says itself."""
     suffix = path.suffix.lower()
     if suffix == ".json" and tool is not None:
         raise InputError(f"{path}: --tool is for CSV and scripts; poses of a weldsim.path/1 are the wire's tip", path=str(path))
-    if suffix not in TABLES and base != "controller":
+    if suffix not in TABLES and base == "base_link":
         raise InputError(f"{path}: --base is for CSV; this file's poses are in the controller's base", path=str(path))
     if suffix in SCRIPTS and roll_free:
         raise InputError(f"{path}: --roll is for paths; a robot program's poses are taken as they are", path=str(path))
@@ -120,7 +121,7 @@ def _text(path: Path) -> str:
     return text
 
 
-def _csv(path: Path, text: str, tool: Tool | None, base: Base, speed: MetrePerSecond, roll_free: bool) -> Program:
+def _csv(path: Path, text: str, tool: Tool | None, base: Base | None, speed: MetrePerSecond, roll_free: bool) -> Program:
     table = read_poses(text, str(path))
     poses, labels = table.poses, table.labels or (path.stem,) * len(table.poses)
     told = "tool0" if "tool0" in table.comments else "torch" if "torch" in table.comments else None
@@ -129,6 +130,14 @@ def _csv(path: Path, text: str, tool: Tool | None, base: Base, speed: MetrePerSe
         notes.append(
             "the file does not say which frame its poses are of: read as tool0 (--tool torch reads them as the wire's tip)"
         )
+    if table.ignored:
+        notes.append(
+            f"what these columns say is not read: {', '.join(table.ignored)}; the arc burns along the whole path, at one speed"
+            " (--speed)"
+        )
+    if base is None and "base_link" in table.comments:
+        base = "base_link"
+        notes.append("the file says base_link: read so, half a turn about z from the controller's (--base controller does not)")
     X_BE = Transform.from_rotation_vector("BT", poses[:, 3:], poses[:, :3])
     if base == "base_link":
         turned = HALF_TURN.R @ X_BE.R

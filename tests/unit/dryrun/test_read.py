@@ -51,6 +51,37 @@ def test_a_csv_in_either_frame_gives_the_torch_in_the_controllers_base(tmp_path,
     assert not program.paths[0].roll_free
 
 
+def test_a_csv_that_says_base_link_is_read_so_and_the_option_overrules_it(tmp_path):
+    rows = "\n".join(f"{0.01 * i:.3f},0.45,0.05,3.1,0.0,0.0" for i in range(5))
+    (tmp_path / "a.csv").write_text("# torch tip, frame: base_link\nx,y,z,rx,ry,rz\n" + rows)
+    (tmp_path / "b.csv").write_text("# torch tip\nx,y,z,rx,ry,rz\n" + rows)
+    told, bare = read_program(tmp_path / "a.csv"), read_program(tmp_path / "b.csv")
+    assert any("says base_link" in note for note in told.notes)
+    np.testing.assert_allclose(told.paths[0].X_BT.p, read_program(tmp_path / "b.csv", base="base_link").paths[0].X_BT.p)
+    np.testing.assert_allclose(bare.paths[0].X_BT.p, read_program(tmp_path / "a.csv", base="controller").paths[0].X_BT.p)
+    assert np.abs(told.paths[0].X_BT.p - bare.paths[0].X_BT.p).max() > 0.8
+
+
+@pytest.mark.parametrize("names", ["speed,arc", "velocity [mm/s],arc_on", "v,weld", "feed rate,blend radius"])
+def test_columns_that_say_how_to_move_or_weld_are_named_as_not_read(tmp_path, names):
+    rows = "\n".join(f"{0.01 * i:.3f},-0.45,0.05,3.1,0.0,0.0,0.02,1" for i in range(5))
+    (tmp_path / "a.csv").write_text(f"# torch\nx,y,z,rx,ry,rz,{names}\n{rows}")
+    (note,) = read_program(tmp_path / "a.csv").notes
+    assert note.startswith(f"what these columns say is not read: {names.replace(',', ', ')}; ")
+    (tmp_path / "b.csv").write_text(f"# torch\nx,y,z,rx,ry,rz,time,index\n{rows}")
+    assert not read_program(tmp_path / "b.csv").notes
+
+
+@pytest.mark.parametrize("head", ["# units: mm\n", "# units: mm\nx,y,z,rx,ry,rz\n", "x [mm],y [mm],z [mm],rx,ry,rz\n"])
+def test_millimetres_said_in_a_comment_or_as_the_refusal_advises(tmp_path, head):
+    rows = "\n".join(f"{10 * i},-450,50,3.1,0.0,0.0" for i in range(5))
+    (tmp_path / "a.csv").write_text(rows)
+    with pytest.raises(InputError, match=r"looks like millimetres; .*or name the columns x \[mm\], y \[mm\], z \[mm\]"):
+        read_program(tmp_path / "a.csv", tool="torch")
+    (tmp_path / "a.csv").write_text(head + rows)
+    np.testing.assert_allclose(read_program(tmp_path / "a.csv", tool="torch").paths[0].X_BT.p[-1], [0.04, -0.45, 0.05])
+
+
 def test_a_csv_that_weldsim_wrote_says_its_frame(tmp_path):
     from weldsim.path.files import write_path_csv
 

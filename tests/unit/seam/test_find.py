@@ -105,6 +105,40 @@ def test_a_groove_that_two_views_show_has_its_width_and_depth(width: float, dept
     assert seam.depth == pytest.approx(depth * 1e-3, abs=2e-4)
 
 
+@pytest.mark.parametrize(("width", "depth"), [(12, 1.8), (12, 3), (16, 2.4), (20, 3), (25, 3)])
+@pytest.mark.parametrize("sigma", [0.0, 3e-4])
+def test_a_shallow_groove_has_its_width(width: float, depth: float, sigma: float) -> None:
+    """A V looks like a square groove of half its width under a window of that width: a sharp sensor has no such window."""
+    sizes = {"width": width * 1e-3, "depth": depth * 1e-3}
+    made = groove_cloud(np.random.default_rng(1), **sizes, tilt=0.1, yaw=0.5, standoff=0.5, noise="iid", sigma=sigma)
+    seam, truth = only_seam(made)
+    assert error(seam, truth).p95 < 0.4e-3
+    assert seam.width == pytest.approx(width * 1e-3, abs=3e-4)
+    assert seam.depth == pytest.approx(depth * 1e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("width", "slant", "sigma"), [(8, 30, 0.0), (12, 25, 3e-4), (12, 30, 3e-4), (16, 35, 1e-4), (20, 40, 2e-4)]
+)
+def test_a_bevel_seen_along_its_ramp_has_its_middle(width: int, slant: int, sigma: float) -> None:
+    """One wall upright, the other at 45 deg, both seen: its looks are those of a narrow groove, its lips are elsewhere."""
+    rng, half, place = np.random.default_rng(0), width * 0.5e-3, np.array([0.0, 0.5, 0.0])
+    eye = np.array([0.0, 0.43 * np.tan(np.radians(slant)), 0.43])
+    x, angle = np.meshgrid(np.arange(-0.1, 0.1, 7e-4), np.radians(slant) + np.arange(-0.22, 0.22, 0.0016))
+    beside = eye[1] - eye[2] * np.tan(angle)  # where a sight line meets the plate
+    on_wall = (beside + half) / np.tan(angle)  # how deep it is when it meets the wall at y = -half
+    on_ramp = (half - beside) / (1 - np.tan(angle))  # and the ramp, which falls towards it
+    inside = np.abs(beside) < half
+    deep = np.where(inside, np.minimum(on_wall, on_ramp), 0.0)
+    points = np.stack([x, beside - deep * np.tan(angle), -deep], axis=-1).reshape(-1, 3)
+    sight = (points - eye) / np.linalg.norm(points - eye, axis=1, keepdims=True)
+    points = points + sight * rng.normal(0.0, sigma + 1e-12, len(points))[:, None]
+    found = find_seams_profile(PointCloud(points=points - place, viewpoints=eye[None] - place), CONFIG)
+    (seam,) = found.seams
+    assert np.abs(seam.points_B[:, 1] + 0.5).max() < 0.2e-3
+    assert seam.width == pytest.approx(2 * half, abs=2e-4)
+
+
 @pytest.mark.parametrize("width", [6, 8, 10, 14, 19, 25])
 def test_widths_under_a_d415(width: int) -> None:
     """Over the seeds; one curve each, clamps and a tilt."""

@@ -1,10 +1,11 @@
 """A strip averaged into cells of station by lateral position: the straightened picture of a groove."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from weldsim.curves import interpolate
@@ -29,6 +30,8 @@ class Grid:
     sight: (m, 3) mean direction of the sight lines, in the cloud's frame; straight down where the viewpoint is unknown.
     step: between stations [m].
     above: height of the viewpoint over the parent surface [m]; infinity where unknown.
+    views: the cells of each view alone; none where all are of one view, or nobody knows of which. A point below the parent
+        surface lies where its sight line meets it, which is another place in each view: taken together, a V has a flat bottom.
     """
 
     x: Float[ndarray, "w"]
@@ -39,6 +42,7 @@ class Grid:
     sight: Float[ndarray, "m 3"]
     step: float
     above: float
+    views: "tuple[Grid, ...]" = ()
 
     @property
     def sparsity(self) -> float:
@@ -48,7 +52,8 @@ class Grid:
 
     def centred(self) -> "Grid":
         """The same with every cell taken to be seen at its middle."""
-        return replace(self, at=np.tile(self.x, (len(self.depth), 1)))
+        views = tuple(view.centred() for view in self.views)
+        return replace(self, at=np.tile(self.x, (len(self.depth), 1)), views=views)
 
     def filled(self) -> Float[ndarray, "m w"]:
         """Depths with empty cells taken from the stations around, where the cloud is sparse, then from their neighbours
@@ -81,8 +86,12 @@ def ray_coordinates(strip: Strip, parent: Parent) -> tuple[Float[ndarray, "k"], 
     return s, x, below * scale
 
 
-def make_grid(rail: Rail, strip: Strip, parent: Parent, half: float) -> Grid:
-    """The grid of a strip out to |x| < half [m]."""
+def make_grid(rail: Rail, strip: Strip, parent: Parent, half: float, views: Sequence[Int[ndarray, "_"]] = ()) -> Grid:
+    """The grid of a strip out to |x| < half [m].
+
+    Args:
+        views: which of its points each view shows.
+    """
     s, x, depth = ray_coordinates(strip, parent)
     m, width = len(rail), int(np.ceil(2 * half / DX))
     row = np.rint(s / rail.step).astype(int)
@@ -103,4 +112,5 @@ def make_grid(rail: Rail, strip: Strip, parent: Parent, half: float) -> Grid:
     every = np.arange(m, dtype=float)
     drift = interpolate(every[known], drift[known] / number[known, None], every) if known.any() else np.zeros((m, 2))
     sight = drift[:, :1] * rail.t + drift[:, 1:] * rail.e - rail.n
-    return Grid(centres, mean.reshape(m, width), at, count.reshape(m, width), drift[:, 1], sight, rail.step, above)
+    apart = tuple(make_grid(rail, strip.select(view), parent, half) for view in views)
+    return Grid(centres, mean.reshape(m, width), at, count.reshape(m, width), drift[:, 1], sight, rail.step, above, apart)

@@ -22,6 +22,9 @@ LEAN_SCORE = 4.5  # standard deviations by which a lean must stand out: most gro
 # Those that are not were made so: a single bevel leans by 1.0, one of 45 and 15 deg by 0.58, one of 30 and 15 deg by 0.37.
 PREPARED, PREPARED_SCORE = 0.35, 3.0  # from which lean on it need only stand out by that
 FIRST_STARTS = ((4e-4, 0.1), (5e-3, 0.1), (4e-4, 0.7), (8e-3, 0.3))  # blur [m], floor: one may stand in for the other
+POOR = 2.0  # half the sum of squares for each cell, from which on a fit is poor: 0.5 is what noise leaves
+FAR_TURNS = 40
+FAR, DEEPER = (-0.3, -0.15, 0.0, 0.15, 0.3), (0.7, 1.0)  # of its width aside, and how much deeper, another section then begins
 STOCKY, FLOORS = (0.8, 1.0, 1.3), (0.05, 0.5)  # how much wider and less deep, and with which floor, another section begins
 # A stereo matcher follows the wall that faces it rather than the other one: the reference camera shows the bottom of a
 # symmetric V displaced twice as far as the sight lines do that.
@@ -76,7 +79,7 @@ def first_section(blocks: Blocks, start: Section, noise: float) -> Section:
     rough = _calm(np.array(starts), views, blocks, start.step)
     found = solve(_picked(rough, len(FIRST_STARTS), 2), _all_but_lean(), views, start.step)
     symmetric, leaning = (min(part, key=lambda each: each.cost) for part in (found[:2], found[2:]))
-    free = solve(leaning.theta[None], np.ones(7, bool), views, start.step)[0]
+    free = _searched(solve(leaning.theta[None], np.ones(7, bool), views, start.step)[0], symmetric, base, views, start.step)
     insists = _insists(_gain(symmetric, free, views, blocks, start.step), free, blocks)
     return section_of((free if insists else symmetric).theta, start.step)
 
@@ -163,7 +166,7 @@ def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: f
     upright = base.copy()
     upright[LEAN] = 0.0
     symmetric = found[0] = min((_either(theta, views, step) for theta in (found[0].theta, upright)), key=lambda each: each.cost)
-    free = _freed(found, views, blocks, step)
+    free = _searched(_freed(found, views, blocks, step), symmetric, base, views, step)
     gain = _gain(symmetric, free, views, blocks, step)
     if gain > WORTH_A_LOOK:
         found = [symmetric, *_at_leans(base, LEANS, views, blocks, step)]
@@ -172,6 +175,28 @@ def _over_leans(base: Float[ndarray, "7"], views: Views, blocks: Blocks, step: f
     if abs(free.theta[LEAN]) > 1e-3:
         found.append(free)
     return found, _insists(gain, free, blocks)
+
+
+def _searched(found: Solution, symmetric: Solution, begun: Float[ndarray, "7"], views: Views, step: float) -> Solution:
+    """The best section of any lean: `found`, or where that one fits poorly, as the symmetric one does, one from where the fit
+    began or from far away.
+
+    A bevel seen along its ramp has its lips elsewhere than where a section of its looks would have them.
+    """
+    if min(found.cost, symmetric.cost) < POOR * views.depth.size:
+        return found
+    base = (found if found.cost < symmetric.cost else symmetric).theta
+    starts = np.array(
+        [
+            [base[0] + aside * base[1], base[1] * wider, base[2] * deeper, 0.05, lean, 4e-4, 0.5]
+            for lean in FIRST_LEANS
+            for aside in FAR
+            for wider in STOCKY
+            for deeper in DEEPER
+        ]
+    )
+    starts = np.concatenate([begun[None], starts])
+    return min([found, *solve(starts, np.ones(7, bool), views, step, most=FAR_TURNS)], key=lambda each: each.cost)
 
 
 def _insists(gain: float, leaning: Solution, blocks: Blocks) -> bool:

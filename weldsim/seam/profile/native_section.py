@@ -14,6 +14,7 @@ import numpy as np
 from weldsim.seam.profile.section import EDGE, NARROWEST, SHARPEST
 from weldsim.seam.profile.shape import (
     BLUR,
+    BLUR_PRIOR,
     DELTA,
     FLOOR_PRIOR,
     HIGH,
@@ -25,7 +26,7 @@ from weldsim.seam.profile.shape import (
 )
 
 _jit = numba.njit(cache=True, nogil=True, error_model="numpy")
-PRIORS = 3  # residuals of floor, slenderness and taper, after those of the data
+PRIORS = 4  # residuals of floor, slenderness, taper and blur, after those of the data
 UNKNOWNS = 7
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e6
 STUCK = 10.0  # a damping under which a step that gains nothing says that there is nothing to gain
@@ -141,12 +142,13 @@ def predict(theta, step, x, shear, depth, jacobian):
 
 @_jit
 @no_type_check
-def terms(theta, step, x, shear, seen, root, white, residual, jacobian):
+def terms(theta, step, x, shear, seen, root, white, sharp, residual, jacobian):
     """Whitened residuals (g w + PRIORS,) and their Jacobian (7, g w + PRIORS) in UNITs, the priors' last.
 
     Args:
         x, seen, root: (g, w) places [m], depths [m] and roots of weights.
         white: (w, w) the transpose of what makes the noise of cells independent; (0, 0) where it is taken to be so.
+        sharp: how much likelier no blur is than a wide one, log likelihood.
     """
     views, w = x.shape
     depth, slopes = np.empty((views, w)), np.empty((UNKNOWNS, views, w))
@@ -167,10 +169,13 @@ def terms(theta, step, x, shear, seen, root, white, residual, jacobian):
     residual[at] = theta[3] / FLOOR_PRIOR
     residual[at + 1] = np.log(theta[2] / theta[1] / SLENDER_PRIOR[0]) / SLENDER_PRIOR[1]
     residual[at + 2] = (theta[TAPER] - TAPER_PRIOR[0]) / TAPER_PRIOR[1]
+    blur, turn = theta[BLUR], np.sqrt(theta[BLUR] * theta[BLUR] + BLUR_PRIOR * BLUR_PRIOR)
+    residual[at + 3] = np.sqrt(2.0 * sharp) * blur / turn
     jacobian[3, at] = UNIT[3] / FLOOR_PRIOR
     jacobian[2, at + 1] = UNIT[2] / theta[2] / SLENDER_PRIOR[1]
     jacobian[1, at + 1] = -UNIT[1] / theta[1] / SLENDER_PRIOR[1]
     jacobian[TAPER, at + 2] = UNIT[TAPER] / TAPER_PRIOR[1]
+    jacobian[BLUR, at + 3] = UNIT[BLUR] * np.sqrt(2.0 * sharp) * BLUR_PRIOR * BLUR_PRIOR / (turn * turn * turn)
 
 
 @_jit
@@ -200,11 +205,11 @@ def _step(gram, gradient, held, damping, move):
 
 @_jit
 @no_type_check
-def solve(theta, free, step, x, shear, seen, root, white, most, costs):
+def solve(theta, free, step, x, shear, seen, root, white, sharp, most, costs):
     """The best section near each start, by Levenberg and Marquardt's method within LOW and HIGH; theta (s, 7) in place.
 
     Args:
-        free: (7,).  x to white: as in `terms`.  most: turns.  costs: (s,) half the sums of squares.
+        free: (7,).  x to sharp: as in `terms`.  most: turns.  costs: (s,) half the sums of squares.
     """
     size = x.size + PRIORS
     residual, new_residual = np.empty(size), np.empty(size)
@@ -213,7 +218,7 @@ def solve(theta, free, step, x, shear, seen, root, white, most, costs):
     held, trial = np.empty(UNKNOWNS, np.bool_), np.empty(UNKNOWNS)
     for s in range(len(theta)):
         one = theta[s]
-        terms(one, step, x, shear, seen, root, white, residual, jacobian)
+        terms(one, step, x, shear, seen, root, white, sharp, residual, jacobian)
         cost, damping, fresh = 0.5 * (residual * residual).sum(), FIRST_DAMPING, True
         for _ in range(most):
             if fresh:
@@ -225,7 +230,7 @@ def solve(theta, free, step, x, shear, seen, root, white, most, costs):
             _step(gram, gradient, held, damping, move)
             for i in range(UNKNOWNS):
                 trial[i] = min(max(one[i] + move[i] * UNIT[i], LOW[i]), HIGH[i])
-            terms(trial, step, x, shear, seen, root, white, new_residual, new_jacobian)
+            terms(trial, step, x, shear, seen, root, white, sharp, new_residual, new_jacobian)
             new_cost = 0.5 * (new_residual * new_residual).sum()
             fresh = new_cost < cost
             if fresh:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.spatial import KDTree
 
@@ -50,8 +50,8 @@ class Strip:
     slope: Float[ndarray, "k 2"]
     above: Float[ndarray, "k"]
 
-    def select(self, chosen: Bool[ndarray, "k"]) -> "Strip":
-        """The chosen points."""
+    def select(self, chosen: Int[ndarray, "j"]) -> "Strip":
+        """The points of those indices."""
         return Strip(*(values[chosen] for values in (self.station, self.s, self.x, self.h, self.slope, self.above)))
 
 

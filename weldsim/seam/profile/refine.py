@@ -6,7 +6,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from weldsim.curves import resample
@@ -20,7 +20,7 @@ from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
 from weldsim.seam.profile.strength import Choice
 from weldsim.seam.profile.track import Track, between, follow, mean_variance, smoothed, track_deviation
-from weldsim.seam.profile.views import agree
+from weldsim.seam.profile.views import Blocks, agree
 
 EXTEND = 0.015  # [m] how far beyond its known part the groove is looked for, each time
 LOOK_AHEAD = 0.036  # [m] how far it is looked for once at rest: noise may have hidden a stretch of it, and a plate's edge aslant
@@ -61,23 +61,16 @@ class Surroundings:
         return lay_out(rail, self.points, self.origins)
 
     @cached_property
-    def of_most_seen_view(self) -> Bool[ndarray, "n"] | None:
-        """The points of the view that shows most of them; None where all are of one view, or of more than MOST_VIEWS."""
+    def views(self) -> list[Int[ndarray, "_"]]:
+        """Which points each view shows; none where all are of one view, or of more than MOST_VIEWS."""
         if self.origins is None or len(self.origins) == 0 or self.origins.strides[0] == 0:
-            return None
-        left, most = np.arange(len(self.origins)), np.empty(0, np.int64)
-        for _ in range(MOST_VIEWS):
+            return []
+        views, left = [], np.arange(len(self.origins))
+        while len(left) and len(views) < MOST_VIEWS:
             same = (self.origins[left] == self.origins[left[0]]).all(axis=1)
-            if np.count_nonzero(same) > len(most):
-                most = left[same]
+            views.append(left[same])
             left = left[~same]
-            if len(left) <= len(most):
-                break
-        if len(left) > len(most) or len(most) == len(self.origins):
-            return None
-        out = np.zeros(len(self.origins), bool)
-        out[most] = True
-        return out
+        return [] if len(left) or len(views) == 1 else views
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,18 +256,14 @@ def _measure(
     blur = start.blur * WIDEST_FOOTPRINT
     inner = 0.5 * start.width + 0.7 * blur + 0.001
     parent = fit_parent(rail, strip, inner, inner + config.side_band, NEAR_RAIL)
-    half, one = 0.5 * start.width + blur + 0.006, around.of_most_seen_view
-    grid = make_grid(rail, strip, parent, half)
+    grid = make_grid(rail, strip, parent, 0.5 * start.width + blur + 0.006, around.views)
     start = replace(start, step=parent.hilo)
     flanked = sided(parent, config)
-    # Without noise the section shows where each view puts its bottom, which is another place than in the next view's picture.
-    shape = grid if one is None else make_grid(rail, strip.select(one), parent, half)
-    blocks = mean_blocks(shape, flanked, start)
+    blocks = mean_blocks(grid, flanked, start)
     if blocks is None or not agree(blocks, start.depth):
-        # A camera's noise outweighs that, and where its points lie in the cells; all views together are the least noisy.
-        grid = grid.centred()
-        shape = grid
-    section, doubt = _fit_grid(shape, flanked, parent.noise, start, stage)
+        # A camera's noise outweighs where its points lie in the cells; only without it do cells' places tell walls from blur.
+        grid, blocks = grid.centred(), blocks and blocks.centred()
+    section, doubt = (start, CERTAIN) if blocks is None else _fit_section(blocks, start, parent.noise, stage)
     track = follow(grid, section, flanked, attached(parent), generalised=stage == "settled")
     section = replace(section, middle=0.0)
     if np.count_nonzero(track.weight) < FEWEST_STATIONS:
@@ -389,15 +378,12 @@ def _evened(image: Float[ndarray, "m w"]) -> Float[ndarray, "m w"]:
     return cv2.boxFilter(image, -1, (1, 9), borderType=cv2.BORDER_CONSTANT)
 
 
-def _fit_grid(grid: Grid, flanked: Bool[ndarray, "m"], noise: float, start: Section, stage: Stage) -> tuple[Section, Doubt]:
+def _fit_section(blocks: Blocks, start: Section, noise: float, stage: Stage) -> tuple[Section, Doubt]:
     """The section fitted to blocks of stations, and how far off its middle may be.
 
     Args:
         noise: the least standard deviation of a cell [m]: that of the plate.
     """
-    blocks = mean_blocks(grid, flanked, start)
-    if blocks is None:
-        return start, CERTAIN
     if stage == "settled":
         return settled_section(blocks, start, noise)
     return (first_section if stage == "first" else follow_section)(blocks, start, noise), CERTAIN

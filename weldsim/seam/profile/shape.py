@@ -18,6 +18,7 @@ DELTA = 1e-4  # of a unit, for the corners' differences
 FLOOR_PRIOR = 0.3  # standard deviation of the floor
 SLENDER_PRIOR = (0.6, 0.3)  # depth over width: 0.6 times or over e^0.3; grooves for welding are opened to 60 to 90 deg
 TAPER_PRIOR = (0.5, 0.2)
+SHARP, BLUR_PRIOR = 16.0, 0.0005  # log likelihood of no blur over one wider than so many metres, where there is no noise either
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,7 @@ def solve(theta: Float[ndarray, "s 7"], free: Bool[ndarray, "7"], views: Views, 
     return [Solution(each, float(c), free) for each, c in zip(theta, cost, strict=True)]
 
 
-def _told(views: Views) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+def _told(views: Views) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray, float]:
     """What the views tell, as the compiled fit takes it."""
-    return views.at, views.shear, views.depth, np.sqrt(views.weight), np.ascontiguousarray(views.white.T)
+    white = np.ascontiguousarray(views.white.T)
+    return views.at, views.shear, views.depth, np.sqrt(views.weight), white, SHARP if views.quiet else 0.0

@@ -32,6 +32,7 @@ ABSENT = 3.0  # log likelihood ratio from which on a groove is not there
 FEWEST_ROWS = 6  # independent looks at the groove that tell how noise is alike across it
 QUIET = 5e-5  # [m] least standard deviation of a cell
 MISSING = 1e6  # times its variance: a cell without data
+ONE_SIDED = 0.1  # weight of a station with a plate on one side alone: what it has on the other is guessed
 LEAST = 0.1  # of the density of the whole seam that tells anything
 
 
@@ -117,13 +118,13 @@ def follow(grid: Grid, section: Section, flanked: Bool[ndarray, "m"], held: Bool
     if generalised and np.count_nonzero(seen) >= FEWEST_ROWS * (2 * least + 1):
         shift, ss = _correlated_shift(grid, depth - model, slope, known, seen, shift, least)
     shift = np.clip(shift, -0.3 * section.width, 0.3 * section.width)
-    weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), 0.1 * ss, 0.0)
+    weights = np.where(seen, ss, 0.0) + np.where(groove & held & ~flanked & between(seen), ONE_SIDED * ss, 0.0)
     if seen.any():
         about = np.abs(shift - np.median(shift[seen]))
         spread = 1.4826 * float(np.median(about[seen]))
         weights = np.where(about > max(6 * spread, 0.002), 0.1 * weights, weights)
     other = _meets_other(within, grid.depth - plates, model, section)
-    run_out = np.where(_run_out(seen, groove & ~flanked & ~other, other), ss, 0.0)
+    run_out = np.where(_run_out(seen, groove & ~flanked & ~other, other), ONE_SIDED * ss, 0.0)
     misfit = _misfit(np.where(known, depth - model, 0.0), depth, known, seen)
     return Track(section.middle + shift, weights, amplitude, local, least, depth_reach, misfit, usual, spread, alike, run_out)
 

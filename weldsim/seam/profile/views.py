@@ -1,6 +1,6 @@
 """A groove's mean sections, one for each direction of sight, and how their noise hangs together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -35,6 +35,10 @@ class Blocks:
     number: Float[ndarray, "b w"]
     shear: Float[ndarray, "b"]
     full: int
+
+    def centred(self) -> "Blocks":
+        """The same with every cell taken to be seen at its middle."""
+        return replace(self, at=np.tile(self.x, (len(self.depth), 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +84,7 @@ def gather(blocks: Blocks, depth: float, noise: float) -> Views:
     shear = np.bincount(of, weights=blocks.shear) / np.bincount(of)
     white = np.linalg.inv(np.linalg.cholesky(correlation_across(off * tame / deviation, known, blocks.x)))
     some = np.maximum(weight, 1e-30)
-    return Views(shear, blocks.x + place / some, total / some, weight, of, each, white, least < QUIETEST[1])
+    return Views(shear, blocks.x + place / some, total / some, weight, of, each, white, _agree(blocks, depth, known, middle[of]))
 
 
 def agree(blocks: Blocks, depth: float) -> bool:
@@ -90,11 +94,16 @@ def agree(blocks: Blocks, depth: float) -> bool:
         depth: of the groove, roughly [m].
     """
     of, known, middle = _grouped(blocks, depth)
-    if len(of) < FEWEST_BLOCKS:
+    return _agree(blocks, depth, known, middle[of])
+
+
+def _agree(blocks: Blocks, depth: float, known: Bool[ndarray, "b w"], middle: Float[ndarray, "b w"]) -> bool:
+    """The same, with what `_grouped` says of them."""
+    if len(blocks.depth) < FEWEST_BLOCKS:
         return False
     with np.errstate(invalid="ignore"):
-        inside = known & (middle[of] > INSIDE * depth)  # a camera that counts in steps shows plates without noise, but no groove
-    off = np.sort(np.abs(blocks.depth - middle[of])[inside])
+        inside = known & (middle > INSIDE * depth)  # a camera that counts in steps shows plates without noise, but no groove
+    off = np.sort(np.abs(blocks.depth - middle)[inside])
     most = off[: int(np.ceil(AGREEING * len(off)))]
     return len(most) > 0 and float(np.sqrt((most * most).mean())) < QUIETEST[1]
 
