@@ -40,7 +40,8 @@ JOINT = re.compile(
     r"|base|shoulder(?:[ _].*)?|elbow(?:[ _].*)?|wrist.*"
 )
 MOTION = re.compile(  # columns that say how a robot is to move or weld
-    r"(?:travel|weld|welding|torch|tcp|tool|lin|linear)?[ _-]*(?:speed|velocity|vel|feed(?:[ _-]?rate)?|acc|acceleration|geschwindigkeit)"
+    r"(?:travel|weld|welding|torch|tcp|tool|lin|linear)?[ _-]*"
+    r"(?:speed|velocity|vel|feed(?:[ _-]?rate)?|acc|acceleration|geschwindigkeit)"
     r"|v|a|f|arc(?:[ _-]?on)?|weld(?:ing)?(?:[ _-]?on)?|blend(?:[ _-]?radius)?|zone|dwell|wait|wire(?:[ _-]?feed)?|current|voltage"
 )
 IN_METRES = ("", "m", "rad", "radian", "radians", "m/s", "s")
