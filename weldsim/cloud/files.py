@@ -217,7 +217,7 @@ def _breadth(points: Float[ndarray, "n 3"]) -> float:
 
 
 def write_cloud(path: str | Path, cloud: PointCloud | Float[ndarray, "n 3"]) -> Path:
-    """Where the cloud now lies: binary PLY (coordinates in double), NPZ (exact, with all viewpoints) or XYZ text (to 1 nm).
+    """Where the cloud now lies: binary PLY (coordinates in double), NPZ (exact) or XYZ text (to 1 nm).
 
     Args:
         cloud: or its points [m].
@@ -238,20 +238,24 @@ def write_cloud(path: str | Path, cloud: PointCloud | Float[ndarray, "n 3"]) -> 
     return write_whole(path, writers[suffix](cloud))
 
 
+_PLY_TYPES = {"<f8": "double", "u1": "uchar", "<u2": "ushort"}
+
+
 def _ply_bytes(cloud: PointCloud) -> bytes:
     layout = [(name, "<f8") for name in "xyz"]
     layout += [(name, "<f8") for name in ("nx", "ny", "nz")] if cloud.normals is not None else []
     layout += [(name, "u1") for name in ("red", "green", "blue")] if cloud.colours is not None else []
+    layout += [("view", "<u2")] if cloud.view is not None else []
     table = np.zeros(len(cloud), layout)
     columns = [cloud.points, cloud.normals, None if cloud.colours is None else np.round(cloud.colours * 255)]
     values = [column[:, axis] for column in columns if column is not None for axis in range(3)]
+    values += [cloud.view] if cloud.view is not None else []
     for (name, _), column in zip(layout, values, strict=True):
         table[name] = column
     header = ["ply", "format binary_little_endian 1.0", f"comment points in frame {cloud.frame}, metres"]
-    if len(cloud.viewpoints) == 1:
-        header.append("comment viewpoint " + " ".join(repr(float(value)) for value in cloud.viewpoints[0]))
+    header += ["comment viewpoint " + " ".join(repr(float(value)) for value in place) for place in cloud.viewpoints]
     header.append(f"element vertex {len(cloud)}")
-    header += [f"property {'uchar' if kind == 'u1' else 'double'} {name}" for name, kind in layout]
+    header += [f"property {_PLY_TYPES[kind]} {name}" for name, kind in layout]
     return "\n".join([*header, "end_header", ""]).encode() + table.tobytes()
 
 

@@ -3,7 +3,7 @@
 Own reader because the counts of a header must be checked against the file before anything is allocated.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -72,7 +72,11 @@ def read_ply(data: bytes) -> RawCloud:
     R = None
     if viewpoints is None and elements[at + 1 :] and elements[at + 1].name == "camera" and not elements[at + 1].has_list:
         viewpoints, R = _camera(read(data, start, [*before, vertex], elements[at + 1], order))
-    return from_columns(columns, viewpoints=viewpoints, rotation=R, unit=unit)
+    cloud = from_columns(columns, viewpoints=viewpoints, rotation=R, unit=unit)
+    view = columns.get("view")
+    if viewpoints is None or len(viewpoints) < 2 or view is None or view.dtype.kind not in "iu":
+        return cloud
+    return replace(cloud, view=view.astype(int))
 
 
 def _camera(columns: dict[str, ndarray]) -> tuple[Float[ndarray, "1 3"] | None, Float[ndarray, "3 3"] | None]:
@@ -88,7 +92,7 @@ def _camera(columns: dict[str, ndarray]) -> tuple[Float[ndarray, "1 3"] | None, 
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | None, str | None, int]:
-    """Byte order ("ascii", "<" or ">"), elements, viewpoint and unit from comments, and where the body starts."""
+    """Byte order ("ascii", "<" or ">"), elements, viewpoints and unit from comments, and where the body starts."""
     end = data.find(b"end_header", 0, _MAX_HEADER)
     newline = min((i for i in (data.find(b"\n", end), data.find(b"\r", end)) if i >= 0), default=-1)
     if end < 0 or newline < 0:
@@ -112,7 +116,8 @@ def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | N
             case ["property", kind, name] if elements and kind in _TYPES:
                 elements[-1].properties.append((name.lower(), _TYPES[kind]))
             case ["comment", "viewpoint", *numbers] if len(numbers) == 3:
-                viewpoints = _viewpoint(numbers)
+                place = _viewpoint(numbers)
+                viewpoints = place if viewpoints is None or place is None else np.concatenate([viewpoints, place])
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case _:

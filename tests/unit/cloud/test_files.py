@@ -332,3 +332,15 @@ def test_survey_coordinates_need_doubles(tmp_path, unit):
         read_cloud(tmp_path / "single.npy", unit=unit)
     np.save(tmp_path / "near.npy", (points - [499_900.0, 4_499_900.0, 0.0]).astype(np.float32) * np.float32(scale))
     assert len(read_cloud(tmp_path / "near.npy", unit=unit)) == 500
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".npz"])
+def test_every_view_of_a_cloud_is_kept(suffix: str, tmp_path: Path) -> None:
+    """A file without them would be planned as one view, or none."""
+    eyes, view = np.array([[0.0, -0.4, 0.5], [0.1, -0.7, 0.4], [-0.2, -0.5, 0.6]]), np.arange(len(POINTS)) % 3
+    cloud = PointCloud(points=POINTS, viewpoints=eyes, view=view, colours=BYTES / 255)
+    back = read_cloud(write_cloud(tmp_path / f"views{suffix}", cloud))
+    np.testing.assert_array_equal(back.viewpoints, eyes)
+    np.testing.assert_array_equal(back.view, view)
+    np.testing.assert_array_equal(back.points, POINTS)
+    np.testing.assert_allclose(back.colours, BYTES / 255)
