@@ -128,6 +128,16 @@ def test_a_failed_verdict_exits_1_and_is_written(tmp_path, monkeypatch, capsys):
     assert json.loads((tmp_path / "out" / "report.json").read_text())["passed"] is False
 
 
+def test_a_run_that_finds_nothing_says_why_and_names_the_setting(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["run", "straight", "--sensor", "exact", "--set", "scene.groove.width=30 mm", "--set", "scene.groove.depth=12 mm"]
+    assert main([*words, "--out", "out"]) == 1
+    told = capsys.readouterr().out
+    assert re.search(r"no seam was found: refused \d+ mm long: opening 30\.\d mm, over the 28 mm of seam\.profile\.max_width", told)
+    main([*words, "--set", "seam.profile.max_width=32 mm", "--out", "out"])
+    assert "no seam was found" not in capsys.readouterr().out
+
+
 def test_a_plate_without_a_seam_passes_when_none_is_found(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "plain", "--json"]) == 0

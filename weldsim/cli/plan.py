@@ -16,9 +16,8 @@ from weldsim.errors import CloudError, InputError, NoSeamError, PathError
 if TYPE_CHECKING:
     from weldsim.config import CellConfig
     from weldsim.pipeline import Clock, PlanResult
-    from weldsim.records import PointCloud, SeamFindings
+    from weldsim.records import PointCloud
 
-TOLD_REASONS = 3
 DEPTH_UNITS = ("1 mm", "0.1 mm")  # of a count, as depth cameras have them
 
 
@@ -84,7 +83,7 @@ class Plan(ConfigOptions):
                 with clock.stage("report"):
                     self._write_report(page, picture, chosen, clock, config)
         if not result.findings.seams:
-            told = "; ".join((_reasons(result.findings), *result.notes))
+            told = "; ".join((reasons_refused(result.findings), *result.notes))
             raise NoSeamError(
                 f"{self.cloud}: no seam found; {told}{self._hint(config)}",
                 rejected=[asdict(refused) for refused in result.findings.rejected],
@@ -298,13 +297,3 @@ def _with_stability(result: "PlanResult", config: "CellConfig") -> "PlanResult":
     from weldsim.seam.stability import with_stability
 
     return replace(result, findings=with_stability(result.cloud, result.findings, config.seam))
-
-
-def _reasons(findings: "SeamFindings") -> str:
-    """Why the longest candidates were refused, in one clause each."""
-    refused = sorted(findings.rejected, key=lambda rejection: -rejection.length)
-    if not refused:
-        return "nothing in it looks like a groove"
-    told = "; ".join(f"{units.to_mm(one.length):.0f} mm long: {one.reason}" for one in refused[:TOLD_REASONS])
-    more = len(refused) - TOLD_REASONS
-    return f"refused {told}" + (f"; and {more} more" if more > 0 else "")

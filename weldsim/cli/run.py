@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from weldsim.cli.options import ConfigOptions, Method, SceneName, choose_platform, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
 from weldsim.cli.quantities import POINT, quantities
-from weldsim.cli.show import check_rows, print_json, print_written, progress, table, times, written_json
+from weldsim.cli.show import check_rows, print_json, print_written, progress, reasons_refused, table, times, written_json
 from weldsim.errors import InputError, SensorError
 from weldsim.sensor.names import SensorName
 
@@ -83,15 +83,16 @@ class Run(ConfigOptions):
             tell("writing", None)
             kept = write_run(folder, result, config, scene, self.seed, self.sensor)
         written = [folder, *([self.video] if self.video is not None and result.log is not None else [])]
-        limits = limits_for(config, scene)
+        limits, found = limits_for(config, scene), result.plan.findings
+        unseen = () if found.seams else (f"no seam was found: {reasons_refused(found)}",)
         if self.json:
             self._print_json(result.report, limits, written, kept)
         else:
             self._print(
                 result.report,
                 limits,
-                len(result.plan.findings.seams),
-                (*result.world.workpiece.notes, *result.world.notes, *notes(result)),
+                len(found.seams),
+                (*result.world.workpiece.notes, *result.world.notes, *notes(result), *unseen),
             )
             print_written(written, kept)
         return 0 if result.report.passed else 1

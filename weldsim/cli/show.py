@@ -8,9 +8,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from weldsim import units
+
 if TYPE_CHECKING:
+    from weldsim.records import SeamFindings
     from weldsim.report.limits import Check
 
+TOLD_REASONS = 3
 PATIENCE = 1.0  # [s] before progress is shown
 
 Tell = Callable[[str, float | None], None]
@@ -29,6 +33,16 @@ def check_rows(checks: "Iterable[Check]") -> list[list[str]]:
     """Lines of a table of figures beside their limits."""
     marks = {True: "ok", False: "FAIL", None: ""}
     return [[c.figure, c.value, c.limit, "amber" if c.passed and c.amber else marks[c.passed]] for c in checks]
+
+
+def reasons_refused(findings: "SeamFindings") -> str:
+    """Why the longest candidates were refused, in one clause each."""
+    refused = sorted(findings.rejected, key=lambda rejection: -rejection.length)
+    if not refused:
+        return "nothing in it looks like a groove"
+    told = "; ".join(f"{units.to_mm(one.length):.0f} mm long: {one.reason}" for one in refused[:TOLD_REASONS])
+    more = len(refused) - TOLD_REASONS
+    return f"refused {told}" + (f"; and {more} more" if more > 0 else "")
 
 
 def times(seconds: dict[str, float]) -> str:

@@ -88,7 +88,7 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
         if arc_length(line[own])[-1] >= 0.8 * config.min_length:
             line, normals = line[own], normals[own]
         fit = grow(atlas, line, normals, config)
-        reason = "no parent surface on both sides at one level"
+        reason = "no groove with its parent surface on both sides at one level could be followed along it"
         if fit is not None:
             span = seam_span(fit, config)
             reason = refusal(fit, span, config)

@@ -19,6 +19,11 @@ CLEAR = 6.0  # score at which 37 % of the doubt is left
 DOUBTFUL = 4.0  # from which on it is named as one that there may be
 
 
+def _limit(name: str, value: float) -> str:
+    """A limit and the setting that holds it."""
+    return f"the {value * 1e3:g} mm of seam.profile.{name}"
+
+
 def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: bool = False) -> str | None:
     """Why the candidate is no groove, one clause, or None if it is one.
 
@@ -28,15 +33,18 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: b
     section, length = fit.section, span[1] - span[0]
     support, look = supported(fit, span, config), _look(fit)
     checks = [
-        (length < config.min_length, f"{length * 1e3:.1f} mm long, under {config.min_length * 1e3:.0f} mm"),
-        (section.width < config.min_width, f"opening {section.width * 1e3:.1f} mm, under {config.min_width * 1e3:.1f} mm"),
-        (section.width > config.max_width, f"opening {section.width * 1e3:.1f} mm, over {config.max_width * 1e3:.1f} mm"),
+        (length < config.min_length, f"a groove over {length * 1e3:.1f} mm, under {_limit('min_length', config.min_length)}"),
+        (section.width < config.min_width, f"opening {section.width * 1e3:.1f} mm, under {_limit('min_width', config.min_width)}"),
+        (section.width > config.max_width, f"opening {section.width * 1e3:.1f} mm, over {_limit('max_width', config.max_width)}"),
         (length < 2.0 * section.width, f"{length * 1e3:.1f} mm long, under twice its width of {section.width * 1e3:.1f} mm"),
         (
             length < LOOKS * look,
             f"{length * 1e3:.1f} mm long, under {LOOKS:g} times the {look * 1e3:.0f} mm that a noisy cloud is averaged over",
         ),
-        (_shown_depth(fit) < config.min_depth, f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {config.min_depth * 1e3:.2f} mm"),
+        (
+            _shown_depth(fit) < config.min_depth,
+            f"{_shown_depth(fit) * 1e3:.2f} mm deep, under {_limit('min_depth', config.min_depth)}",
+        ),
         (fit.track.misfit > MISFIT_LIMIT, f"cross-sections fit a groove poorly ({fit.track.misfit:.2f}, limit {MISFIT_LIMIT})"),
         (
             _lapses(fit, span) > most_lapses(length, look),
