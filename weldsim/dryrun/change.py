@@ -37,7 +37,8 @@ def changed(program: Program, cell: Cell, change: Change) -> tuple[Program, Cell
         raise InputError(f"--move {_said(move)}: {fault}; {_instead(cell, move)}", value=move[:2].tolist(), fault=fault)
     if program.kind == "script":
         if change.lean is not None or change.speed is not None:
-            raise InputError(f"{program.source}: --lean and --speed are for paths; a robot program names its own")
+            given = " and ".join(name for name, value in (("--lean", change.lean), ("--speed", change.speed)) if value is not None)
+            raise InputError(f"{program.source}: {given}: for paths; a robot program names its own")
         program = changed_program(program, turn=change.turn or 0.0, move=move)
     else:
         program = replace(program, paths=tuple(_changed_path(path, change, move) for path in program.paths))

@@ -223,7 +223,7 @@ class _Recorder:
             return None, self.state.to_pose(values) @ X_FT
         q = np.array(values)
         if np.abs(q).max() > LARGEST_ANGLE:
-            raise ScriptError(f"{name}: a joint at {np.abs(q).max():.4g} rad: looks like degrees")
+            raise ScriptError(f"{name}: a joint at {np.abs(q).max():.4g} rad: looks like degrees; write d2r(...) around each")
         self.state.to_joints(values)
         return q, None
 

@@ -82,6 +82,16 @@ def test_millimetres_said_in_a_comment_or_as_the_refusal_advises(tmp_path, head)
     np.testing.assert_allclose(read_program(tmp_path / "a.csv", tool="torch").paths[0].X_BT.p[-1], [0.04, -0.45, 0.05])
 
 
+def test_joints_in_degrees_are_read_once_written_as_the_refusal_advises(tmp_path):
+    file = tmp_path / "p.script"
+    file.write_text("movej([0, -90, 90, -90, -90, 0])\nmovej([10, -90, 90, -90, -90, 0])\n")
+    with pytest.raises(InputError, match=r"looks like degrees; write d2r\(\.\.\.\) around each"):
+        read_program(file)
+    around = ", ".join(f"d2r({angle})" for angle in (0, -90, 90, -90, -90, 0))
+    file.write_text(f"movej([{around}])\nmovej([d2r(10){around[6:]}])\n")
+    assert read_program(file).kind == "script"
+
+
 def test_a_csv_that_weldsim_wrote_says_its_frame(tmp_path):
     from weldsim.path.files import write_path_csv
 
