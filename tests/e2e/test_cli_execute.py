@@ -17,6 +17,7 @@ from tests.machine import unless_held_up
 from tests.path_files import document, written
 from tests.ur_robots import PATIENT
 from weldsim.cli import main
+from weldsim.errors import InputError
 from weldsim.execution.black_box import read_black_box
 from weldsim.execution.simulated import SimulatedRobot
 from weldsim.execution.ur_robot import UrRobot
@@ -133,6 +134,23 @@ def test_a_refusal_names_the_dry_run_that_repeats_it(tmp_path: Path, capsys: pyt
     assert words[:5] == ["weldsim", "dry-run", file, "--scene", "plain"]
     assert main([*words[1:], "--no-fix"]) == 1
     assert "unreachable" in capsys.readouterr().out
+
+
+def test_a_path_off_the_scenes_seam_is_asked_about_before_anything_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[str] = []
+
+    def connect(_: SimulatedRobot) -> None:
+        told.append(capsys.readouterr().err)
+        raise InputError("far enough")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(SimulatedRobot, "connect", connect)
+    main(["execute", written(tmp_path, document(shift=(0.15, -0.6, 0.022))), "--robot", "sim", "--scene", "straight"])
+    assert "off the nearest seam of the part in straight: is it that part's" in told[0]
+    main(["execute", written(tmp_path, document(shift=(-0.015, -0.45, 0.022))), "--robot", "sim", "--scene", "straight"])
+    assert "nearest seam" not in told[1]
 
 
 def test_a_scenes_own_limits_are_those_of_the_json_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

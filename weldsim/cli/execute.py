@@ -1,6 +1,7 @@
 """`weldsim execute`."""
 
 import shlex
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -92,6 +93,7 @@ class Execute(ConfigOptions):
 
         from weldsim.clock import Clock
         from weldsim.config import paced_for
+        from weldsim.dryrun.run import beside_seams
         from weldsim.welding.folder import job_document, write_job
         from weldsim.welding.seams import file_findings
 
@@ -99,6 +101,9 @@ class Execute(ConfigOptions):
         scene = None if self.scene is None else self.scene_of(self.scene)
         config = paced_for(config, scene)
         cell, known = self._cell(scene, config)
+        alone = replace(program, paths=program.paths[job.seam :][:1], names=program.names[job.seam :][:1])
+        for note in beside_seams(alone, cell):  # before anything moves
+            print(f"weldsim: {note}", file=sys.stderr)
         with progress() as tell:
             clock = Clock(tell)
             robot = self._robot(config, cell)

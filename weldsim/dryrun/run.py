@@ -54,7 +54,7 @@ def dry_run(
         tell("fixes", None)
         fixes = for_all(fixes, all_followed, trials, cell, config, program.given)
     trials = [replace(trial, margins=margins(trial, cell, config)) for trial in trials]
-    notes = (*program.notes, *cell.notes, *_beside_table(program, cell), *_beside_seams(program, cell))
+    notes = (*program.notes, *cell.notes, *_beside_table(program, cell), *beside_seams(program, cell))
     return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=notes)
 
 
@@ -69,7 +69,7 @@ def _beside_table(program: Program, cell: Cell) -> list[str]:
     return notes
 
 
-def _beside_seams(program: Program, cell: Cell) -> list[str]:
+def beside_seams(program: Program, cell: Cell) -> list[str]:
     """Welds that lie off every seam of the scene's part: perhaps another part's, or it stands elsewhere; one sentence each."""
     notes = []
     for path, name in zip(program.paths, program.names, strict=True):
