@@ -10,7 +10,7 @@ from weldsim import units
 from weldsim.cli.options import ConfigOptions, Method, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
 from weldsim.cli.quantities import COUNT, POINT, quantities, quantity
-from weldsim.cli.show import Tell, progress, table, times
+from weldsim.cli.show import Tell, progress, reasons_refused, table, times
 from weldsim.errors import CloudError, InputError, NoSeamError, PathError
 
 if TYPE_CHECKING:
