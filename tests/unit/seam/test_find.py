@@ -290,7 +290,7 @@ def test_every_refusal_has_its_place_and_reason() -> None:
     strict = ProfileConfig(max_width=0.010)
     found = find_seams_profile(made.cloud, strict)
     assert found.seams == ()
-    assert any("10.0 mm" in refused.reason for refused in found.rejected)
+    assert any("over the 10 mm of seam.profile.max_width" in refused.reason for refused in found.rejected)
     for refused in found.rejected:
         assert refused.length > 0
         assert np.isfinite(refused.position_B).all()
