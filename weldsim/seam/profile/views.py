@@ -98,7 +98,7 @@ def agree(blocks: Blocks, depth: float) -> bool:
 
 
 def _agree(blocks: Blocks, depth: float, known: Bool[ndarray, "b w"], middle: Float[ndarray, "b w"]) -> bool:
-    """The same, with what `_grouped` says of them."""
+    """Whether they do so, with the known cells and each block's median section [m] as `_grouped` says them."""
     if len(blocks.depth) < FEWEST_BLOCKS:
         return False
     with np.errstate(invalid="ignore"):
