@@ -66,6 +66,27 @@ def test_clamps_and_the_table_fall_out(seed: int) -> None:
     assert parent.support[hidden, 0].max() < 0.4, "no surface is seen where a clamp stands on it"
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("ends", [(0.03, 0.17), (0.0, 0.16), (0.045, 0.2)])
+def test_the_table_past_a_thin_plates_ends_does_not_bend_its_surface(seed: int, ends: tuple[float, float]) -> None:
+    """A plate 10 mm thick whose edges a camera's window of 10 mm smooths into ramps, under noise as smooth as that."""
+    rng = np.random.default_rng(seed)
+    waves = [(rng.uniform(0, 2 * np.pi), rng.uniform(100, 400, 2), 4e-4) for _ in range(6)]
+
+    def height(s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        past = np.maximum(ends[0] - s, s - ends[1])
+        noise = sum(size * np.sin(phase + k[0] * s + k[1] * x) for phase, k, size in waves)
+        return noise - 0.010 * np.clip(past / 0.010 + 0.5, 0.0, 1.0)
+
+    rail = straight_rail()
+    parent = fit_parent(rail, strip_of(rail, height, rng, noise=3e-4), INNER, OUTER)
+    at = np.arange(len(rail)) * rail.step
+    on = (at > ends[0] + 0.006) & (at < ends[1] - 0.006)
+    past = (at < ends[0] - 0.008) | (at > ends[1] + 0.008)
+    assert np.abs(surface(parent, 0.0))[on].max() < 1.5e-3
+    assert parent.support[past].max() < 0.4, "the table is no part of the plate's surface"
+
+
 def test_a_step_or_a_fold_between_the_sides_is_told() -> None:
     rail = straight_rail()
     stepped = fit_parent(rail, strip_of(rail, lambda s, x: np.where(x > 0, 0.004, 0.0), np.random.default_rng(0)), INNER, OUTER)

@@ -18,9 +18,7 @@ LEANS = (-1.0, -0.7, -0.4, -0.15, 0.15, 0.4, 0.7, 1.0)  # of the most that leave
 FIRST_LEANS = (0.0, -0.8, 0.8)
 FEW_LEANS = (0.0, -0.6, 0.6)  # looked at first
 WORTH_A_LOOK = 2.0  # log likelihood ratio of the best lean there from which all are looked at
-LEAN_SCORE = 4.5  # standard deviations by which a lean must stand out: most grooves are symmetric
-# Those that are not were made so: a single bevel leans by 1.0, one of 45 and 15 deg by 0.58, one of 30 and 15 deg by 0.37.
-PREPARED, PREPARED_SCORE = 0.35, 3.0  # from which lean on it need only stand out by that
+LEAN_SCORE = 4.5  # standard deviations by which a lean must stand out: most grooves are symmetric; a single bevel shows 6 to 40
 FIRST_STARTS = ((4e-4, 0.1), (5e-3, 0.1), (4e-4, 0.7), (8e-3, 0.3))  # blur [m], floor: one may stand in for the other
 POOR = 2.0  # half the sum of squares for each cell, from which on a fit is poor: 0.5 is what noise leaves
 FAR_TURNS = 40
@@ -90,12 +88,15 @@ def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Secti
     found, insists = _over_leans(unknowns(start), views, blocks, start.step)
     lean = np.array([each.theta[LEAN] for each in found])
     middle = np.array([each.theta[0] for each in found])
-    mass = _likelihood(found, lean, views, blocks, start.step)
+    mass = _likelihood(found, lean, views, blocks, start.step, whitened=True)
     chosen = float(mass @ lean) if insists else 0.0
     theta = found[int(np.argmin(np.abs(lean - chosen)))].theta.copy()
     theta[LEAN] = chosen
     last = _either(theta, views, start.step)
     between = float(mass @ (middle - last.theta[0]) ** 2)
+    if not insists:  # leans may be less well told apart than they seem: the doubt errs on the wide side
+        mass = _likelihood(found, lean, views, blocks, start.step, whitened=False)
+        between = max(between, float(mass @ (middle - last.theta[0]) ** 2))
     exchange = abs(float(np.polyfit(lean, middle, 1)[0]))
     unnoticed = float(mass[lean == 0.0].sum()) * (2 * UNNOTICED * exchange) ** 2
     most = MOST_DOUBT * float(last.theta[1])
@@ -201,8 +202,7 @@ def _searched(found: Solution, symmetric: Solution, begun: Float[ndarray, "7"], 
 
 def _insists(gain: float, leaning: Solution, blocks: Blocks) -> bool:
     """Whether the data insist on a lean, the more so on one that a slanted look at a symmetric groove may have made up."""
-    prepared = abs(leaning.theta[LEAN]) >= PREPARED
-    score = SLANT_SCORE if _made_up(leaning, blocks) else PREPARED_SCORE if prepared else LEAN_SCORE
+    score = SLANT_SCORE if _made_up(leaning, blocks) else LEAN_SCORE
     return gain > score**2 / 2
 
 
@@ -228,14 +228,17 @@ def _at_leans(base: Float[ndarray, "7"], leans: tuple[float, ...], views: Views,
 
 def _gain(symmetric: Solution, free: Solution, views: Views, blocks: Blocks, step: float) -> float:
     """Log likelihood ratio of a leaning solution to the symmetric one, no better known than the data's scatter allows."""
-    return (symmetric.cost - free.cost) / max(1.0, _excess(symmetric, free, views, blocks, step))
+    return (symmetric.cost - free.cost) / max(1.0, _excess(symmetric, free, views, blocks, step, whitened=True))
 
 
-def _likelihood(found: list[Solution], lean: Float[ndarray, "s"], views: Views, blocks: Blocks, step: float) -> Float[ndarray, "s"]:
+def _likelihood(
+    found: list[Solution], lean: Float[ndarray, "s"], views: Views, blocks: Blocks, step: float, whitened: bool
+) -> Float[ndarray, "s"]:
     """How likely each solution is: a symmetric groove, or one of any lean alike that is not made up, before; as well as it
-    fits, after."""
+    fits, after.
+    """
     best = min(found, key=lambda each: each.cost)
-    worse = np.array([(e.cost - best.cost) / max(1.0, _excess(e, best, views, blocks, step)) for e in found])
+    worse = np.array([(e.cost - best.cost) / max(1.0, _excess(e, best, views, blocks, step, whitened)) for e in found])
     order = np.argsort(lean)
     between = 0.5 * (lean[order][1:] + lean[order][:-1])
     span = np.empty(len(lean))
@@ -250,17 +253,25 @@ def _likelihood(found: list[Solution], lean: Float[ndarray, "s"], views: Views, 
     return mass / mass.sum()
 
 
-def _scores(pull: Float[ndarray, "p g w"], depth: Float[ndarray, "g w"], views: Views, blocks: Blocks) -> Float[ndarray, "p b n"]:
-    """What each block's cells in each bin across the seam add to the whitened products of `pull` with the residual."""
+def _scores(
+    pull: Float[ndarray, "p g w"], depth: Float[ndarray, "g w"], views: Views, blocks: Blocks, whitened: bool = False
+) -> Float[ndarray, "p b n"]:
+    """What each block's cells in each bin across the seam add to the whitened products of `pull` with the residual.
+
+    The sum over bins is the same either way. `whitened` products are those of numbers that are independent where the noise is
+    as it was taken to be. Otherwise each cell's residual is weighted by all the cells it hangs together with: neighbours' signs
+    alternate then where the noise is smooth, and bins that cancel look like scatter.
+    """
     root = np.sqrt(views.weight)
-    reach = ((pull * root) @ (views.white.T @ views.white)) / np.maximum(root, 1e-12)
-    residual = np.where(views.each > 0, depth[views.of] - blocks.depth, 0.0)
-    score = reach[:, views.of] * (views.each * residual)
+    residual = np.where(views.each > 0, depth[views.of] - blocks.depth, 0.0) * views.each / np.maximum(root, 1e-12)[views.of]
+    reach = (pull * root) @ views.white.T
+    told, voted = (reach, residual @ views.white.T) if whitened else (reach @ views.white, residual)
+    score = told[:, views.of] * voted
     number = np.floor(blocks.x / BIN).astype(int)
     return np.stack([score[:, :, number == k].sum(axis=2) for k in np.unique(number)], axis=2)
 
 
-def _excess(one: Solution, best: Solution, views: Views, blocks: Blocks, step: float) -> float:
+def _excess(one: Solution, best: Solution, views: Views, blocks: Blocks, step: float, whitened: bool) -> float:
     """Variance of the data's vote between two solutions, over what the noise's correlation lets one expect.
 
     From block to block along the seam and from bin to bin across it: clusters both ways (Cameron, Gelbach and Miller 2011).
@@ -269,7 +280,7 @@ def _excess(one: Solution, best: Solution, views: Views, blocks: Blocks, step: f
         return 1.0
     depth, _ = predict(np.stack([one.theta, best.theta]), step, views.at, views.shear)
     apart = ((depth[1] - depth[0]) * np.sqrt(views.weight)) @ views.white.T
-    votes = _scores((depth[1] - depth[0])[None], depth[1], views, blocks)[0]
+    votes = _scores((depth[1] - depth[0])[None], depth[1], views, blocks, whitened)[0]
     n = len(votes)
     along = float((votes.sum(axis=1) ** 2).sum()) * n / max(n - 5, 0.4 * n)
     across = float((votes.sum(axis=0) ** 2).sum()) - float((votes**2).sum())

@@ -14,6 +14,10 @@ WINDOW = 0.020  # [m] along the seam, over which the two sides are compared
 STIFFNESSES = (0.02, 0.5, 10.0, 200.0, 4000.0)  # of the penalty on roughness, relative to the data between two knots
 FOLD = 0.030  # [m] along the seam, left out together to choose the stiffness
 LEVER = 0.020  # [m] that turns twist into height
+# The first turns look at so much of the rail, from its middle: past the end of a thin plate the table would bend the surface.
+GROWING = (0.6, 0.75, 0.9)
+TURNS, CHOOSING = 10, 4  # of the fit at most, and the one that chooses the stiffness
+AT_REST = 1e-7  # [m] a surface that moves no more, under a scale that stays the same, is fitted
 HILO_SCORE = 4.0  # standard deviations
 ALIKE = 15.0  # cells
 HILO_LEAST = 2.5e-4  # [m] misalignment in height that is worth a term of its own
@@ -62,12 +66,13 @@ def fit_parent(rail: Rail, strip: Strip, inner: float, outer: float, reach: floa
     penalty, target = _roughness(rail, knots)
     penalty, target = penalty * len(s) / knots, target * len(s) / knots
     fold = np.floor(s / FOLD).astype(int)
-    theta, weight, scale = _robust(design, h, penalty, target, fold)
+    from_middle = np.abs(2 * s / length - 1)
+    theta, weight, scale = _robust(design, h, penalty, target, fold, from_middle)
     hilo = 0.0
     side = np.sign(x) / 2
     if _insists(design, h - design @ theta, weight, side, fold):
         wider = np.concatenate([design, side[:, None]], axis=1)
-        theta, weight, scale = _robust(wider, h, np.pad(penalty, (0, 1)), np.pad(target, (0, 1)), fold)
+        theta, weight, scale = _robust(wider, h, np.pad(penalty, (0, 1)), np.pad(target, (0, 1)), fold, from_middle)
         theta, hilo = theta[:-1], float(theta[-1])
     residual = h - design @ theta - hilo * side
     good = np.abs(residual) < min(3 * scale, TOLERANCE)
@@ -102,23 +107,32 @@ def _robust(
     penalty: Float[ndarray, "p p"],
     target: Float[ndarray, "p"],
     fold: Int[ndarray, "k"],
+    far: Float[ndarray, "k"],
 ) -> tuple[Float[ndarray, "p"], Float[ndarray, "k"], float]:
-    """Coefficients, weights and scale [m] of the reweighted fit; the stiffness is chosen on the way."""
+    """Coefficients, weights and scale [m] of the reweighted fit; the stiffness is chosen on the way.
+
+    Args:
+        far: from the middle of the rail, over half its length: the fit begins there and grows towards the ends.
+    """
     from weldsim.seam.profile import native
 
     stiffness, scale = STIFFNESSES[2], 0.003
-    weight = np.ones(len(h))
-    theta = np.zeros(design.shape[1])
+    weight = (far < GROWING[0]).astype(float)
+    theta, residual = np.zeros(design.shape[1]), h
     held = np.empty((len(design), int(np.count_nonzero(design, axis=1).max(initial=0))), np.int64)
     native.held_columns(design, held)
-    for turn in range(8):
-        if turn == 4:
+    for turn in range(TURNS):
+        if turn == CHOOSING:
             stiffness = _choose_stiffness(design, held, h, weight, penalty, target, fold % 4)
         theta = _solve(design, held, h, weight, stiffness * penalty, stiffness * target)
-        residual = h - design @ theta
+        before, residual = residual, h - design @ theta
         spread = 1.4826 * float(np.median(np.abs(residual)[weight > 0.05])) if (weight > 0.05).any() else scale
-        scale = max(0.6 * scale, 1.5 * spread, 1e-5)
+        last, scale = scale, max(0.6 * scale, 1.5 * spread, 1e-5)
         weight = np.maximum(1 - (residual / (3 * scale)) ** 2, 0.0) ** 2
+        if turn + 1 < len(GROWING):
+            weight *= far < GROWING[turn + 1]
+        if turn > CHOOSING and abs(scale - last) < AT_REST and float(np.abs(residual - before).max(initial=0.0)) < AT_REST:
+            break
     return theta, weight, scale
 
 
