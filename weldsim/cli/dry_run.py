@@ -259,9 +259,10 @@ class DryRunCommand(ConfigOptions):
             print(f"  {note}")
         for trial, fixes in zip(result.trials, result.fixes, strict=True):
             state = f"{trial.cycle:.1f} s" if trial.passed else "fails"
-            print(f"  {trial.name}: {len(trial.verdicts)} waypoints, {units.to_mm(trial.length):.0f} mm, {state}")
+            what = "motion" if trial.verdicts[0].line else "waypoint"
+            print(f"  {trial.name}: {len(trial.verdicts)} {what}s, {units.to_mm(trial.length):.0f} mm, {state}")
             if rows := failures(trial):
-                print(table(rows, ("waypoint", "s", "verdict", "reason")))
+                print(table(rows, (what, "s", "verdict", "reason")))
             if trial.margins:
                 print(table([_margin_row(margin) for margin in trial.margins], ("figure", "worst", "limit", "at", "")))
             for fix in fixes:
@@ -304,5 +305,6 @@ def _margin_row(margin: "Margin") -> list[str]:
 
 def _row(first: "Verdict", last: "Verdict") -> list[str]:
     """One line of the table of failures."""
-    span = first.label if first.index == last.index else f"{first.label} to {last.index}"
-    return [span, "" if first.s is None else f"{units.to_mm(first.s):.1f} mm", first.why, first.text]
+    from weldsim.dryrun.verdict import span
+
+    return [span(first, last), "" if first.s is None else f"{units.to_mm(first.s):.1f} mm", first.why, first.text]
