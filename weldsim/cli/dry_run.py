@@ -1,6 +1,6 @@
 """`weldsim dry-run`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -126,6 +126,10 @@ class DryRunCommand(ConfigOptions):
             raise InputError(f"{self.file}: --reach-map and --export are for paths; this is a robot program already")
         if program.kind == "script" and self.arm is not None:
             raise InputError(f"{self.file}: --arm is for paths; the joint angles of a robot program are an arm's own already")
+        if program.from_start and self.start is None:
+            stands = ", ".join(f"{units.to_deg(q):.1f}" for q in cell.q_start.tolist())
+            note = f"{program.from_start}: the arm is taken to stand at {stands} deg; --start says where it does"
+            program = replace(program, notes=(*program.notes, note))
         program, cell = changed(program, cell, change)
         with progress() as tell:
             result = dry_run(program, cell, config.motion, fix=not self.no_fix, tell=tell)

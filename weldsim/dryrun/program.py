@@ -58,6 +58,7 @@ class Program:
         X_FT: flange to the tool that the poses are of.  pauses: time in which a script stands still [s].
         notes: what was assumed, one sentence each.
         given: what the poses were turned and leaned by already.
+        from_start: what of a script depends on how the arm stands when it begins, in words; "" where nothing does.
     """
 
     source: str
@@ -69,3 +70,4 @@ class Program:
     pauses: float = 0.0
     notes: tuple[str, ...] = ()
     given: Given = Given()
+    from_start: str = ""

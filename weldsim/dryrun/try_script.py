@@ -61,7 +61,7 @@ def try_script(program: Program, cell: Cell) -> Trial:
             there, q = target is not None, q if target is None else target
             continue
         fresh = index == 0 or program.motions[index - 1].command != "servoj"
-        way = _way(motion, q, fresh) if there else _target(motion, target, q)
+        way = _way(motion, q, fresh, index == 0) if there else _target(motion, target, q)
         checked, q_at = _checked(verdict, way, cell, failed)
         verdicts.append(late if failed and checked.ok else checked)
         if there:
@@ -198,16 +198,16 @@ def _deepest(q: Float[ndarray, "n 6"], hit: Touch, cell: Cell) -> float:
     return max([hit.depth, *same])
 
 
-def _way(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
-    """The motion from q; `fresh` where no servoj came before it."""
+def _way(motion: Motion, q: Float[ndarray, "6"], fresh: bool, first: bool) -> _Way:
+    """The motion from q; `fresh` where no servoj came before it, `first` where nothing did."""
     if motion.command == "servoj":
-        return _servo(motion, q, fresh)
+        return _servo(motion, q, fresh, first)
     if motion.command == "movej":
         return _joint_move(motion, q)
     return _straight(motion, q)
 
 
-def _servo(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
+def _servo(motion: Motion, q: Float[ndarray, "6"], fresh: bool, first: bool) -> _Way:
     target = motion.q if motion.q is not None else _near(motion.X_BT, q)
     if target is None:
         return _Way(q=q[None], duration=0.0, why="unreachable", text=_unreached(motion))
@@ -218,8 +218,9 @@ def _servo(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
     if np.abs(target).max() > JOINT_LIMIT:
         return _beyond(way, target, motion.t)
     if fresh and step[joint] > STALE:
+        standing = ", or say where it really stands (--start)" if first else ""
         text = f"servoj begins {turn:.1f} deg of {name} away from where the arm stands (limit {np.rad2deg(STALE):.1f} deg)"
-        return _Way(q=way, duration=motion.t, why="stale start", text=f"{text}; movej there first", at=len(way) - 1)
+        return _Way(q=way, duration=motion.t, why="stale start", text=f"{text}; movej there first{standing}", at=len(way) - 1)
     if step[joint] > SERVO_JUMP:
         text = f"{name} jumps {turn:.1f} deg to this target (limit {np.rad2deg(SERVO_JUMP):.1f} deg)"
         return _Way(q=way, duration=motion.t, why="joint jump", text=text, at=len(way) - 1)
