@@ -125,7 +125,7 @@ def _csv(path: Path, text: str, tool: Tool | None, base: Base | None, speed: Met
     table = read_poses(text, str(path))
     poses, labels = table.poses, table.labels or (path.stem,) * len(table.poses)
     told = "tool0" if "tool0" in table.comments else "torch" if "torch" in table.comments else None
-    notes = [table.note] if table.note else []
+    notes = list(table.notes)
     if tool is None and told is None:
         notes.append(
             "the file does not say which frame its poses are of: read as tool0 (--tool torch reads them as the wire's tip)"

@@ -190,7 +190,11 @@ def test_a_turn_in_place_is_a_jump_and_every_one_is_told() -> None:
     [
         ("0,1,-0,45,0,1,3,1,0,0,0,01", "decimal commas need ; between the columns", "0,1;-0,45;0,1;3,1;0,0;0,01"),
         ("7,0.1,-0.45,0.1,3.1,0,0.01,99", "name them on the first line", "n,x,y,z,rx,ry,rz,i\n7,0.1,-0.45,0.1,3.1,0,0.01,99"),
-        ("x [mm],y,z,rx,ry,rz\n100,-0.45,0.1,3.1,0,0.01", "metres and radians", "x [m],y,z,rx,ry,rz\n0.1,-0.45,0.1,3.1,0,0.01"),
+        (
+            "x [mm],y,z,rx,ry,rz\n100,-0.45,0.1,3.1,0,0.01",
+            "give each of them the same",
+            "x [m],y,z,rx,ry,rz\n0.1,-0.45,0.1,3.1,0,0.01",
+        ),
         ("X,Y,Z,A,B,C\n0.1,-0.45,0.1,3.1,0,0.01", "x y z rx ry rz", "X,Y,Z,RX,RY,RZ\n0.1,-0.45,0.1,3.1,0,0.01"),
     ],
 )
