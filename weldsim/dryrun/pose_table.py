@@ -56,10 +56,12 @@ FEW_DEGREES = np.deg2rad(7.0)  # [rad] to which radians come that are taken for 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PoseTable:
-    """Attributes: poses, in order, as UR writes them [m, rad]; labels, of the seam of each, None where no column names it;
-    comments, all of them; notes, what the reader was not sure of; ignored, columns that say how to move or weld."""
+    """Attributes: poses, in order, as UR writes them [m, rad]; lines, of the file, from 1, of each; labels, of the seam of each,
+    None where no column names it; comments, all of them; notes, what the reader was not sure of; ignored, columns that say how to
+    move or weld."""
 
     poses: Float[ndarray, "n 6"]
+    lines: tuple[int, ...]
     labels: tuple[str, ...] | None
     comments: str
     notes: tuple[str, ...] = ()
@@ -117,6 +119,7 @@ def read_poses(text: str, where: str) -> PoseTable:
         notes.append(f"{degrees} are all under {np.rad2deg(FEW_DEGREES):.0f} deg: if they are radians, name them so, [rad]")
     return PoseTable(
         poses=poses,
+        lines=tuple(numbers),
         labels=None if label is None else tuple(labels),
         comments=comments,
         notes=tuple(notes),

@@ -54,6 +54,7 @@ class Program:
     Attributes:
         source: the file's name.  kind: what it is.
         paths: welds to be planned, and their names; empty for a script.
+        lines: of the file, from 1, that the poses of each path stand in; empty where they have none of their own.
         motions: what a script commands, in order; empty otherwise.
         X_FT: flange to the tool that the poses are of.  pauses: time in which a script stands still [s].
         notes: what was assumed, one sentence each.
@@ -65,6 +66,7 @@ class Program:
     kind: Literal["path", "csv", "script"]
     paths: tuple[TorchPath, ...] = ()
     names: tuple[str, ...] = ()
+    lines: tuple[tuple[int, ...], ...] = ()
     motions: tuple[Motion, ...] = ()
     X_FT: Transform = X_FT
     pauses: float = 0.0
