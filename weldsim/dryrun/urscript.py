@@ -70,6 +70,11 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
         raise InputError(f"{source}: makes no movej, movel, movep, movec or servoj; there is nothing to check", path=source)
     if len(recorder.motions) < 2:
         raise InputError(f"{source}: 1 motion; a path needs two", path=source)
+    if recorder.effects is not None:
+        for name, line in recorder.effects.moving_threads():  # one that runs is refused
+            recorder.notes.add(
+                f"thread {name}", f"line {line}: thread {name} would move the arm, but is never run: its motions are not checked"
+            )
     if recorder.halted_at is not None:
         recorder.notes.add("halt", f"{recorder.halted}; what comes after it is not read")
     return Program(
