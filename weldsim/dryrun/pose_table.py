@@ -105,7 +105,7 @@ def read_poses(text: str, where: str) -> PoseTable:
     values = np.array(rows, float) * [column.scale for column in columns]
     _check_vectors(values, columns, table, where, numbers)
     poses = _ur_poses(values, columns, where, numbers)
-    check_poses(poses, where, numbers)
+    check_poses(poses, where, numbers, columns[0].scale)
     near = float(np.linalg.norm(poses[:, :3], axis=1).min())
     notes = []
     if near > OUT_OF_REACH:
@@ -127,8 +127,12 @@ def read_poses(text: str, where: str) -> PoseTable:
     )
 
 
-def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> None:
-    """Nothing, when UR poses are in metres and radians. Raises InputError naming the line."""
+def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int], scale: float = 1.0) -> None:
+    """Nothing, when UR poses are in metres and radians. Raises InputError naming the line.
+
+    Args:
+        scale: metres per unit that the file gives its positions.
+    """
     far, turn = np.linalg.norm(poses[:, :3], axis=1), np.linalg.norm(poses[:, 3:], axis=1)
     distant = far.max() > FURTHEST or np.ptp(poses[:, :3], axis=0).max() > MILLIMETRE_SPAN
     turned = turn.max() > LONGEST_TURN
@@ -136,7 +140,11 @@ def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> N
     at, value = f"{where}: line {lines[worst]}", float((far if distant else turn)[worst])
     length, unit = ("micrometres", "um") if far.max() > LEAST_MICROMETRES else ("millimetres", "mm")
     needed = "x y z [m] and rx ry rz [rad] are needed"
-    units = [unit if distant else "m"] * 3 + ["deg" if turned else "rad"] * 3
+    given = next(name for name in ("m", "mm", "cm", "um", "in", *UNITS) if UNITS[name] == scale)
+    if distant and scale != 1.0:
+        said = f"{value:.4g} m from the base (limit {FURTHEST:g} m), read in {given} as the file says; is that its unit?"
+        raise InputError(f"{at}: {said}", line=lines[worst], value=value)
+    units = [unit if distant else given] * 3 + ["deg" if turned else "rad"] * 3
     named = (
         f"; or name the columns {', '.join(f'{name} [{unit}]' for name, unit in zip(WANTED, units, strict=True))} in a first line"
     )

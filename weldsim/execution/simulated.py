@@ -20,7 +20,6 @@ from weldsim.execution.config import SimulationConfig
 from weldsim.execution.robot import Robot
 from weldsim.frames import Transform
 from weldsim.kinematics import DH, JOINT_NAMES
-from weldsim.motion.collision import deep
 from weldsim.mounts import PAYLOAD, PAYLOAD_COG, X_FT
 from weldsim.records import Event, RobotFacts, RobotState
 
@@ -199,7 +198,8 @@ class SimulatedRobot(Robot):
                 bodies = sorted(self.model.body(self.model.geom_bodyid[g]).name or "world" for g in geoms)
                 pair = (bodies[0], bodies[1])
                 if pair not in touching and pair not in self._touching:
-                    said = deep(-float(self.data.contact.dist[k]))
-                    self._events.append(Event(t=self.t, kind="contact", text=f"{pair[0]} touches {pair[1]} ({said})"))
+                    depth = -1e3 * float(self.data.contact.dist[k])
+                    said = f"{depth:.2f}" if depth >= 0.005 else "under 0.01"
+                    self._events.append(Event(t=self.t, kind="contact", text=f"{pair[0]} touches {pair[1]} ({said} mm deep)"))
                 touching.add(pair)
         self._touching = touching

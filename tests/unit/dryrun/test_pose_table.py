@@ -139,3 +139,13 @@ def test_the_columns_named_as_an_error_asks_are_read(scale, unit, turn, angle) -
     read = read_poses(table(names, *columns), "a.csv").poses
     np.testing.assert_allclose(read[:, :3], P, atol=1e-3)
     np.testing.assert_allclose(matrix_from_rotation_vector(read[:, 3:]), X.R, atol=1e-7)
+
+
+def test_a_unit_that_a_comment_gives_is_kept_in_the_advice_and_asked_about_where_it_cannot_be() -> None:
+    columns = P * 1e3, np.degrees(V)
+    with pytest.raises(InputError, match=r"name the columns x \[mm\], y \[mm\], z \[mm\], rx \[deg\]"):
+        read_poses(table("# units: mm", *columns), "a.csv")
+    named = table("# units: mm\nx [mm],y [mm],z [mm],rx [deg],ry [deg],rz [deg]", *columns)
+    np.testing.assert_allclose(read_poses(named, "a.csv").poses[:, :3], P, atol=1e-8)
+    with pytest.raises(InputError, match=r"m from the base \(limit 3 m\), read in mm as the file says; is that its unit\?$"):
+        read_poses(table("x [mm],y [mm],z [mm],rx,ry,rz", P * 1e6, V), "a.csv")
