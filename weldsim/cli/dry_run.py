@@ -1,6 +1,6 @@
 """`weldsim dry-run`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -126,6 +126,10 @@ class DryRunCommand(ConfigOptions):
             raise InputError(f"{self.file}: --reach-map and --export are for paths; this is a robot program already")
         if program.kind == "script" and self.arm is not None:
             raise InputError(f"{self.file}: --arm is for paths; the joint angles of a robot program are an arm's own already")
+        if program.from_start and self.start is None:
+            stands = ", ".join(f"{units.to_deg(q):.1f}" for q in cell.q_start.tolist())
+            note = f"{program.from_start}: the arm is taken to stand at {stands} deg; --start says where it does"
+            program = replace(program, notes=(*program.notes, note))
         program, cell = changed(program, cell, change)
         with progress() as tell:
             result = dry_run(program, cell, config.motion, fix=not self.no_fix, tell=tell)
@@ -259,9 +263,10 @@ class DryRunCommand(ConfigOptions):
             print(f"  {note}")
         for trial, fixes in zip(result.trials, result.fixes, strict=True):
             state = f"{trial.cycle:.1f} s" if trial.passed else "fails"
-            print(f"  {trial.name}: {len(trial.verdicts)} waypoints, {units.to_mm(trial.length):.0f} mm, {state}")
+            what = "motion" if trial.verdicts[0].line else "waypoint"
+            print(f"  {trial.name}: {len(trial.verdicts)} {what}s, {units.to_mm(trial.length):.0f} mm, {state}")
             if rows := failures(trial):
-                print(table(rows, ("waypoint", "s", "verdict", "reason")))
+                print(table(rows, (what, "s", "verdict", "reason")))
             if trial.margins:
                 print(table([_margin_row(margin) for margin in trial.margins], ("figure", "worst", "limit", "at", "")))
             for fix in fixes:
@@ -304,5 +309,6 @@ def _margin_row(margin: "Margin") -> list[str]:
 
 def _row(first: "Verdict", last: "Verdict") -> list[str]:
     """One line of the table of failures."""
-    span = first.label if first.index == last.index else f"{first.label} to {last.index}"
-    return [span, "" if first.s is None else f"{units.to_mm(first.s):.1f} mm", first.why, first.text]
+    from weldsim.dryrun.verdict import span
+
+    return [span(first, last), "" if first.s is None else f"{units.to_mm(first.s):.1f} mm", first.why, first.text]

@@ -13,7 +13,7 @@ from numpy import ndarray
 from weldsim import units
 from weldsim.dryrun.margin import Margin
 from weldsim.dryrun.margins import joint_speeds
-from weldsim.dryrun.verdict import DryRun, Fix, Trial, Verdict, runs
+from weldsim.dryrun.verdict import DryRun, Fix, Trial, Verdict, runs, span
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, SPEED_LIMIT
 from weldsim.output import write_whole
 from weldsim.report.figures import shade_arc
@@ -52,7 +52,8 @@ def _broken(fix: Fix) -> str:
 
 def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[dict[str, Any]], speed_limit: float) -> str:
     failure = trial.failure
-    said = f"{units.to_mm(trial.length):.0f} mm long, {len(trial.verdicts)} waypoints"
+    what = "motion" if trial.verdicts[0].line else "waypoint"
+    said = f"{units.to_mm(trial.length):.0f} mm long, {len(trial.verdicts)} {what}s"
     parts = [f"<section><h2>{escape(trial.name)}: {'would pass' if failure is None else 'would fail'}</h2><p>{escape(said)}</p>"]
     if failure is not None:
         parts.append(f'<ul class="reasons"><li>{escape(place(failure))}: {escape(failure.why)}: {escape(failure.text)}</li></ul>')
@@ -69,7 +70,7 @@ def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[
         parts.append(f'<section><h2>{title}</h2><img style="max-width:100%" src="data:image/png;base64,{image}"></section>')
     if trial.margins:
         parts.append(f"<section><h2>Clearance and margins</h2>{_margins(trial.margins)}</section>")
-    parts.append(f"<section><h2>Waypoints</h2>{_waypoints(trial)}</section>")
+    parts.append(f"<section><h2>{what.capitalize()}s</h2>{_waypoints(trial, what)}</section>")
     if len(trial.q) > 1:
         plots = [("Joint angles", trial.t, np.rad2deg(trial.q), "joint angle [deg]", np.rad2deg(JOINT_LIMIT))]
         plots.append(("Joint speeds", trial.t[1:], np.rad2deg(joint_speeds(trial)), "joint speed [deg/s]", np.rad2deg(speed_limit)))
@@ -94,16 +95,15 @@ def place(verdict: Verdict) -> str:
     return verdict.label if verdict.s is None else f"{verdict.label}, s = {units.to_mm(verdict.s):.1f} mm"
 
 
-def _waypoints(trial: Trial) -> str:
+def _waypoints(trial: Trial, what: str) -> str:
     rows = []
     found = runs(trial.verdicts)
     for first, last in found[:ROWS]:
-        span = first.label if first is last or first.index == last.index else f"{first.label} to {last.label}"
         s = _span(first.s, last.s)
         mark = '<td class="mark ok">ok</td>' if first.ok else f'<td class="mark no">{escape(first.why)}</td>'
-        rows.append(f'<tr><td>{escape(span)}</td><td class="num">{s}</td>{mark}<td>{escape(first.text)}</td></tr>')
+        rows.append(f'<tr><td>{escape(span(first, last))}</td><td class="num">{s}</td>{mark}<td>{escape(first.text)}</td></tr>')
     more = f"<p>and {len(found) - ROWS} more</p>" if len(found) > ROWS else ""
-    head = "<tr><th>waypoint</th><th>s</th><th>verdict</th><th>reason</th></tr>"
+    head = f"<tr><th>{what}</th><th>s</th><th>verdict</th><th>reason</th></tr>"
     return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>{more}"
 
 

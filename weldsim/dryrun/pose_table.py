@@ -25,6 +25,7 @@ from weldsim.records import MILLIMETRE_SPAN
 
 LONGEST_TURN = 2 * np.pi + 1e-6  # [rad] of a rotation vector
 FURTHEST = 3.0  # [m] from the base: further is a unit mistaken
+LEAST_MICROMETRES = 2e4  # read as metres: what lies further out than 20 m in millimetres
 OUT_OF_REACH = 1.5  # [m] from the base: no tip of this arm is further away
 LARGEST_ANGLE = 360.0  # [deg] of a joint
 WANTED = ("x", "y", "z", "rx", "ry", "rz")
@@ -44,19 +45,26 @@ MOTION = re.compile(  # columns that say how a robot is to move or weld
     r"(?:speed|velocity|vel|feed(?:[ _-]?rate)?|acc|acceleration|geschwindigkeit)"
     r"|v|a|f|arc(?:[ _-]?on)?|weld(?:ing)?(?:[ _-]?on)?|blend(?:[ _-]?radius)?|zone|dwell|wait|wire(?:[ _-]?feed)?|current|voltage"
 )
-IN_METRES = ("", "m", "rad", "radian", "radians", "m/s", "s")
-DEGREES = ("deg", "degree", "degrees", "\u00b0")
+RADIANS = ("rad", "radian", "radians")
+DEGREES = ("deg", "degree", "degrees", "\u00b0", "\u00ba")
+BARE = ("", "-", "1")  # units of a quaternion
+TURNS = dict.fromkeys(("", *RADIANS), 1.0) | dict.fromkeys(DEGREES, float(np.pi / 180))  # [rad] per unit
+AFTER = re.compile(rf"[ _./-]+(?:in[ _]+)?({'|'.join(map(re.escape, (*UNITS, *RADIANS, *DEGREES)))})\.?$")  # a unit behind a name
+LONGEST_VECTOR = np.deg2rad(180.5)  # [rad] of a rotation vector in degrees: longer ones are roll, pitch and yaw
+FEW_DEGREES = np.deg2rad(7.0)  # [rad] to which radians come that are taken for degrees
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PoseTable:
-    """Attributes: poses, in order, as UR writes them [m, rad]; labels, of the seam of each, None where no column names it;
-    comments, all of them; note, what the reader was not sure of, or ""; ignored, columns that say how to move or weld."""
+    """Attributes: poses, in order, as UR writes them [m, rad]; lines, of the file, from 1, of each; labels, of the seam of each,
+    None where no column names it; comments, all of them; notes, what the reader was not sure of; ignored, columns that say how to
+    move or weld."""
 
     poses: Float[ndarray, "n 6"]
+    lines: tuple[int, ...]
     labels: tuple[str, ...] | None
     comments: str
-    note: str = ""
+    notes: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
 
 
@@ -94,44 +102,89 @@ def read_poses(text: str, where: str) -> PoseTable:
         rows.append(values)
         labels.append("" if label is None else cells[label])
     numbers = [number for number, _ in body]
-    poses = _ur_poses(np.array(rows, float) * [column.scale for column in columns], columns, where, numbers)
-    check_poses(poses, where, numbers)
+    values = np.array(rows, float) * [column.scale for column in columns]
+    _check_vectors(values, columns, table, where, numbers)
+    poses = _ur_poses(values, columns, where, numbers)
+    check_poses(poses, where, numbers, columns[0].scale)
     near = float(np.linalg.norm(poses[:, :3], axis=1).min())
-    note = f"every pose is over {near:.2g} m from the base: if these are six joint angles, movej in a .script takes them"
+    notes = []
+    if near > OUT_OF_REACH:
+        notes.append(f"every pose is over {near:.2g} m from the base: if these are six joint angles, movej in a .script takes them")
+    if (degrees := _in_degrees(table, columns)) and columns[3].what == "rx":
+        notes.append(
+            f"{degrees} are read as a rotation vector in degrees; if they are roll, pitch and yaw, name them roll [deg], pitch"
+            " [deg], yaw [deg]"
+        )
+    if degrees and np.abs(values[:, 3:]).max() < FEW_DEGREES:
+        notes.append(f"{degrees} are all under {np.rad2deg(FEW_DEGREES):.0f} deg: if they are radians, name them so, [rad]")
     return PoseTable(
         poses=poses,
+        lines=tuple(numbers),
         labels=None if label is None else tuple(labels),
         comments=comments,
-        note=note if near > OUT_OF_REACH else "",
+        notes=tuple(notes),
         ignored=tuple(name.text for name in table.names or () if MOTION.fullmatch(_bare(name).strip(" _-"))),
     )
 
 
-def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int]) -> None:
-    """Nothing, when UR poses are in metres and radians. Raises InputError naming the line."""
+def check_poses(poses: Float[ndarray, "n 6"], where: str, lines: list[int], scale: float = 1.0) -> None:
+    """Nothing, when UR poses are in metres and radians. Raises InputError naming the line.
+
+    Args:
+        scale: metres per unit that the file gives its positions.
+    """
     far, turn = np.linalg.norm(poses[:, :3], axis=1), np.linalg.norm(poses[:, 3:], axis=1)
     distant = far.max() > FURTHEST or np.ptp(poses[:, :3], axis=0).max() > MILLIMETRE_SPAN
+    turned = turn.max() > LONGEST_TURN
     worst = int((far if distant else turn).argmax())
     at, value = f"{where}: line {lines[worst]}", float((far if distant else turn)[worst])
+    length, unit = ("micrometres", "um") if far.max() > LEAST_MICROMETRES else ("millimetres", "mm")
     needed = "x y z [m] and rx ry rz [rad] are needed"
-    named = "; or name the columns x [mm], y [mm], z [mm], rx, ry, rz in a first line"
-    if distant and turn.max() > LONGEST_TURN:
+    given = next(name for name in ("m", "mm", "cm", "um", "in", *UNITS) if UNITS[name] == scale)
+    if distant and scale != 1.0:
+        said = f"{value:.4g} m from the base (limit {FURTHEST:g} m), read in {given} as the file says; is that its unit?"
+        raise InputError(f"{at}: {said}", line=lines[worst], value=value)
+    units = [unit if distant else given] * 3 + ["deg" if turned else "rad"] * 3
+    named = (
+        f"; or name the columns {', '.join(f'{name} [{unit}]' for name, unit in zip(WANTED, units, strict=True))} in a first line"
+    )
+    if distant and turned:
         angles = float(np.abs(poses).max()) <= LARGEST_ANGLE
-        what = "six joint angles in degrees, or millimetres and degrees" if angles else "millimetres and degrees"
+        what = f"six joint angles in degrees, or {length} and degrees" if angles else f"{length} and degrees"
         advice = "; joint angles: movej([d2r(...), ...]) in a .script" if angles else ""
-        raise InputError(f"{at}: {_said(poses[worst])}: looks like {what}; {needed}{advice}", line=lines[worst], value=value)
+        raise InputError(f"{at}: {_said(poses[worst])}: looks like {what}; {needed}{named}{advice}", line=lines[worst], value=value)
     if distant:
         raise InputError(
-            f"{at}: {value:.4g} m from the base (limit {FURTHEST:g} m): looks like millimetres; {needed}{named}",
+            f"{at}: {value:.4g} m from the base (limit {FURTHEST:g} m): looks like {length}; {needed}{named}",
             line=lines[worst],
             value=value,
         )
-    if turn.max() > LONGEST_TURN:
+    if turned:
         raise InputError(
-            f"{at}: rotation vector of length {value:.4g} (limit 2 pi): looks like degrees; {needed}",
+            f"{at}: rotation vector of length {value:.4g} (limit 2 pi): looks like degrees; {needed}{named}",
             line=lines[worst],
             value=value,
         )
+
+
+def _check_vectors(values: Float[ndarray, "n k"], columns: list["_Column"], table: TextTable, where: str, lines: list[int]) -> None:
+    """Nothing, when what is called rx ry rz in degrees can be a rotation vector. Raises InputError naming the line."""
+    degrees = _in_degrees(table, columns)
+    turn = np.linalg.norm(values[:, 3:6], axis=1)
+    worst = int(turn.argmax())
+    if degrees and columns[3].what == "rx" and turn[worst] > LONGEST_VECTOR:
+        raise InputError(
+            f"{where}: line {lines[worst]}: {degrees} make a rotation vector of {np.rad2deg(turn[worst]):.0f} deg (limit 180 deg);"
+            " if they are roll, pitch and yaw, name them roll [deg], pitch [deg], yaw [deg]",
+            line=lines[worst],
+        )
+
+
+def _in_degrees(table: TextTable, columns: list["_Column"]) -> str:
+    """The names of the rotation's columns, where they are in degrees, else ""."""
+    if table.names is None or columns[3].scale == 1.0:
+        return ""
+    return ", ".join(table.names[column.at].text for column in columns[3:])
 
 
 def _said(pose: Float[ndarray, "6"]) -> str:
@@ -181,21 +234,18 @@ def _scale(wanted: str, table: TextTable, found: dict[str, int], lines: list[str
     """Metres or radians per unit of a column. Raises InputError for a unit that is neither, or leaves the pose open."""
     assert table.names is not None
     name = table.names[found[wanted]]
-    unit = _unit(name) or (unit_of_comments(lines[: table.first]) or "" if wanted in AXES else "")
-    of_axes = {_unit(table.names[found[axis]]) for axis in AXES}
-    if wanted in AXES and unit in UNITS and len(of_axes) == 1:
-        return UNITS[unit]
-    if wanted in ANGLES and unit in DEGREES:
-        return float(np.pi / 180)
-    if unit in IN_METRES:
-        return 1.0
+    kind = next(kind for kind in (AXES, WANTED[3:], QUATERNION, ANGLES) if wanted in kind)
+    unit = _unit(name) or (unit_of_comments(lines[: table.first]) or "" if kind is AXES else "")
+    scales = {AXES: {"": 1.0} | UNITS, QUATERNION: dict.fromkeys(BARE, 1.0)}.get(kind, TURNS)
+    of_kind = {scales.get(_unit(table.names[found[each]]) or unit) for each in kind}
+    if unit in scales and len(of_kind) == 1:
+        return scales[unit]
     line = next((n for n, text in enumerate(lines[: table.first], 1) if name.text in text), table.first)
-    needed = "metres and radians are needed"
-    if wanted in AXES and unit in UNITS:
-        needed += f", or {unit} of x, y and z alike"
-    elif unit in DEGREES:
-        needed += "; if they are roll, pitch and yaw, name them roll [deg], pitch [deg], yaw [deg]"
-    raise InputError(f"{where}: line {line}: column {wanted} is in {unit}; {needed}", path=where, line=line)
+    if unit in scales:
+        said = ", ".join(table.names[found[each]].text for each in kind)
+        raise InputError(f"{where}: line {line}: {said} are not all in one unit; give each of them the same", path=where, line=line)
+    needed = {AXES: "m, mm, cm, um or in", QUATERNION: "no unit"}.get(kind, "rad or deg")
+    raise InputError(f"{where}: line {line}: column {name.text} is in {unit}; {needed} is needed", path=where, line=line)
 
 
 def _ur_poses(values: Float[ndarray, "n k"], columns: list[_Column], where: str, lines: list[int]) -> Float[ndarray, "n 6"]:
@@ -241,19 +291,20 @@ def _wanted(name: ColumnName, turned: bool) -> str | None:
 
 def _inner(name: ColumnName) -> str:
     """A column's name without unit, and without the tool and the message that it is of."""
-    bare = re.sub(r"_(m|mm|cm|in|rad|deg)$", "", _bare(name))
+    bare = AFTER.sub("", _bare(name))
     return OF_THE_TOOL.sub("", WITHIN.sub("", bare))
 
 
 def _bare(name: ColumnName) -> str:
     """A column's name without the unit in brackets, lower case."""
-    return re.sub(r"[\[({].*", "", name.text.lower()).strip()
+    return re.sub(r"[\[({<].*", "", name.text.lower()).strip()
 
 
 def _unit(name: ColumnName) -> str:
+    """The unit that a column's name gives, or ""."""
     if name.unit is not None:
         return name.unit
-    found = re.search(r"_(m|mm|cm|in|rad|deg)$", name.text.lower())
+    found = AFTER.search(name.text.lower())
     return "" if found is None else found[1]
 
 

@@ -54,18 +54,22 @@ class Program:
     Attributes:
         source: the file's name.  kind: what it is.
         paths: welds to be planned, and their names; empty for a script.
+        lines: of the file, from 1, that the poses of each path stand in; empty where they have none of their own.
         motions: what a script commands, in order; empty otherwise.
         X_FT: flange to the tool that the poses are of.  pauses: time in which a script stands still [s].
         notes: what was assumed, one sentence each.
         given: what the poses were turned and leaned by already.
+        from_start: what of a script depends on how the arm stands when it begins, in words; "" where nothing does.
     """
 
     source: str
     kind: Literal["path", "csv", "script"]
     paths: tuple[TorchPath, ...] = ()
     names: tuple[str, ...] = ()
+    lines: tuple[tuple[int, ...], ...] = ()
     motions: tuple[Motion, ...] = ()
     X_FT: Transform = X_FT
     pauses: float = 0.0
     notes: tuple[str, ...] = ()
     given: Given = Given()
+    from_start: str = ""

@@ -125,7 +125,7 @@ def _csv(path: Path, text: str, tool: Tool | None, base: Base | None, speed: Met
     table = read_poses(text, str(path))
     poses, labels = table.poses, table.labels or (path.stem,) * len(table.poses)
     told = "tool0" if "tool0" in table.comments else "torch" if "torch" in table.comments else None
-    notes = [table.note] if table.note else []
+    notes = list(table.notes)
     if tool is None and told is None:
         notes.append(
             "the file does not say which frame its poses are of: read as tool0 (--tool torch reads them as the wire's tip)"
@@ -144,7 +144,7 @@ def _csv(path: Path, text: str, tool: Tool | None, base: Base | None, speed: Met
         X_BE = Transform("BT", turned, X_BE.p @ HALF_TURN.R.T)
     chosen = tool or told or "tool0"
     X_BT = X_BE if chosen == "torch" else Transform("BF", X_BE.R, X_BE.p) @ X_FT
-    paths, names = [], []
+    paths, names, lines = [], [], []
     for name in dict.fromkeys(labels):
         mine = [i for i, label in enumerate(labels) if label == name]
         if len(mine) < 2:
@@ -163,4 +163,5 @@ def _csv(path: Path, text: str, tool: Tool | None, base: Base | None, speed: Met
         if paths[-1].s[-1] < SHORTEST:
             raise InputError(f"{path}: {name}: all {len(mine)} poses are in one place; a path has a length", path=str(path))
         names.append(name)
-    return Program(source=path.name, kind="csv", paths=tuple(paths), names=tuple(names), notes=tuple(notes))
+        lines.append(tuple(table.lines[i] for i in mine))
+    return Program(source=path.name, kind="csv", paths=tuple(paths), names=tuple(names), lines=tuple(lines), notes=tuple(notes))

@@ -20,16 +20,19 @@ class RobotState:
 
     Attributes:
         mount: X_FT of the TCP in force.
+        asked: the first function whose answer came from where the arm stands before its first motion, or "".
     """
 
     def __init__(self, mount: Transform, q_start: np.ndarray | None = None) -> None:
         self.mount = mount
         self._q = q_start  # [rad] the last joint angles that are known
         self._since: list[Transform] = []  # X_BF of the motions after them
+        self._from_start = True  # whether what is known comes from where it stood
+        self.asked = ""
 
     def to_joints(self, q: list[float]) -> None:
         """The arm goes to joint angles [rad]."""
-        self._q, self._since = np.array(q), []
+        self._q, self._since, self._from_start = np.array(q), [], False
 
     def to_pose(self, pose: list[float]) -> Transform:
         """The arm goes to a pose of the TCP; its flange's, X_BF."""
@@ -105,6 +108,8 @@ class RobotState:
         """Where the arm is [rad], its poses since reached in the branch it is in."""
         if self._q is None:
             raise ScriptError(f"{name}: where the arm is by then is not known; begin with movej to six joint angles")
+        if self._from_start:
+            self.asked = self.asked or name
         q = self._q
         for X_BF in self._since:
             if len(inverse(X_BF)):  # out of reach the arm stays where it was, and that motion fails when it is checked

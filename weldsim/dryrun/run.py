@@ -11,6 +11,7 @@ from weldsim.dryrun.cell import Cell
 from weldsim.dryrun.fix import fixes_for_path, fixes_for_script
 from weldsim.dryrun.margins import margins
 from weldsim.dryrun.program import Program
+from weldsim.dryrun.stray import strays
 from weldsim.dryrun.together import for_all
 from weldsim.dryrun.try_script import try_script
 from weldsim.dryrun.verdict import DryRun
@@ -54,7 +55,7 @@ def dry_run(
         tell("fixes", None)
         fixes = for_all(fixes, all_followed, trials, cell, config, program.given)
     trials = [replace(trial, margins=margins(trial, cell, config)) for trial in trials]
-    notes = (*program.notes, *cell.notes, *_beside_table(program, cell), *beside_seams(program, cell))
+    notes = (*program.notes, *cell.notes, *_beside_table(program, cell), *beside_seams(program, cell), *_astray(program))
     return DryRun(source=program.source, cell=cell.name, trials=tuple(trials), fixes=tuple(fixes), notes=notes)
 
 
@@ -66,6 +67,19 @@ def _beside_table(program: Program, cell: Cell) -> list[str]:
         beyond = float(np.maximum(TABLE[0] - places, places - TABLE[1]).max())
         if beyond > 0 and not cell.has_part:
             notes.append(f"{name} goes {1e3 * beyond:.0f} mm beyond the table's edge; what holds the part there is not known")
+    return notes
+
+
+def _astray(program: Program) -> list[str]:
+    """Waypoints that lie aside of an otherwise smooth line, one sentence each."""
+    notes = []
+    for k, (path, name) in enumerate(zip(program.paths, program.names, strict=True)):
+        for stray in strays(path):
+            line = f" (line {program.lines[k][stray.index]})" if program.lines else ""
+            notes.append(
+                f"{name}: pose {stray.index}{line} lies {1e3 * stray.aside:.1f} mm aside of the line through its neighbours; is"
+                " it where it is meant to be?"
+            )
     return notes
 
 

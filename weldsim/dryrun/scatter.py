@@ -60,26 +60,37 @@ def scatter_of(path: TorchPath) -> Scatter:
 
     From the distance that QUANTILE of them keep to: corners and jumps, which are few, have no say. A weave is no scatter.
     """
-    places = _places(path)
+    places = distinct(path)
     if len(places) < FEWEST:
         return Scatter(position=0.0, rotation=0.0)
     p, q = path.X_BT.p[places], _continuous(path.X_BT.quaternion[places])
+    return Scatter(
+        position=_deviation(p, p, LENGTHS[0]), rotation=_deviation(2.0 * q, p, LENGTHS[1])
+    )  # half the turn is in a quaternion
+
+
+def position_scatter(p: Float[ndarray, "n 3"]) -> float:
+    """The scatter of positions alone [m], no two of which are in one place; of too few it is none, and a weave counts too."""
+    return _deviation(p, p, LENGTHS[0], weave=True) if len(p) >= FEWEST else 0.0
+
+
+def _deviation(values: Float[ndarray, "n d"], p: Float[ndarray, "n 3"], length: float, weave: bool = False) -> float:
+    """Standard deviation of each axis of values at places p, whose distances from the cubic have this length at QUANTILE.
+
+    Args:
+        weave: whether a weave is scatter.
+    """
     weights = _cubic_weights(arc_length(p))
+    off_cubic = _off_cubic(values, weights)
+    if not weave and _weaves(off_cubic):
+        return 0.0
     scale = np.sqrt(1.0 + np.sum(weights**2, axis=1))
-    out = []
-    for values, length in zip((p, 2.0 * q), LENGTHS, strict=True):  # half the turn stands in a quaternion
-        off_cubic = _off_cubic(values, weights)
-        if _weaves(off_cubic):
-            out.append(0.0)
-            continue
-        off = np.linalg.norm(off_cubic, axis=1)
-        out.append(float(np.quantile(off / scale, QUANTILE)) / length)
-    return Scatter(position=out[0], rotation=out[1])
+    return float(np.quantile(np.linalg.norm(off_cubic, axis=1) / scale, QUANTILE)) / length
 
 
 def is_even(path: TorchPath) -> bool:
     """Whether the waypoints' places scatter alike in every direction, as noise does, and a weave, which is flat, does not."""
-    p = path.X_BT.p[_places(path)]
+    p = path.X_BT.p[distinct(path)]
     if len(p) < FEWEST:
         return False
     off = _off_cubic(p, _cubic_weights(arc_length(p)))
@@ -107,7 +118,7 @@ def refit(path: TorchPath, scatter: Scatter, share: float = 1.0) -> Refit:
 
     Of positions that is the distance across the curve: waypoints that lie closer than they scatter lead forth and back along it.
     """
-    places = _places(path)
+    places = distinct(path)
     p, q = path.X_BT.p[places], _continuous(path.X_BT.quaternion[places])
     s = arc_length(p)
     u = s / s[-1]
@@ -144,7 +155,7 @@ def nearest_in_order(values: Float[ndarray, "n"], at: Float[ndarray, "m"]) -> In
     return np.where(at - values[after - 1] <= values[after] - at, after - 1, after)
 
 
-def _places(path: TorchPath) -> ndarray:
+def distinct(path: TorchPath) -> ndarray:
     """Indices of the waypoints, without those in the same place as the one before, but for noise."""
     steps = np.linalg.norm(np.diff(path.X_BT.p, axis=0), axis=1)
     same = max(SAME, min(STILL[0], STILL[1] * float(np.quantile(steps, 0.9))))

@@ -1,5 +1,6 @@
 """A robot program tried: each motion as the controller would make it, in the branch the arm is in."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from weldsim.dryrun.verdict import Trial, Verdict, Why
 from weldsim.frames import Transform, rotation_vector_from_matrix, slerp, unit
 from weldsim.kinematics import JOINT_LIMIT, JOINT_NAMES, SPEED_LIMIT, inverse, torch_pose
 from weldsim.motion.arm import dexterity
+from weldsim.motion.collision import SHALLOW, Touch
 from weldsim.motion.rungs import SINGULAR
 from weldsim.motion.sweep import STEP_LENGTH, STEP_TURN, first_touch
 from weldsim.mounts import X_FT
@@ -40,36 +42,38 @@ def try_script(program: Program, cell: Cell) -> Trial:
     """A verdict for every motion of the program, the arm starting where the cell has it.
 
     What follows a failure is not reached; it is checked all the same, as if the arm had come to the target that failed, so that
-    every failure is told. Where nobody can say how the arm would stand, that goes on from the next target in joint angles.
+    every failure is told. From a target that it does not reach nobody can say how it would go on: of the motion after it the
+    target alone is checked, and the arm taken to stand there, as near to where it was last as it can.
     """
-    q: Float[ndarray, "6"] | None = np.array(cell.q_start, float)
+    q: Float[ndarray, "6"] = np.array(cell.q_start, float)
     verdicts: list[Verdict] = []
     t, rows, arc, clock = [np.zeros(1)], [q[None]], [np.zeros(1, bool)], 0.0
     q_worst, p_worst, length, gone, failed = None, None, 0.0, 0.0, False
     start = _bad_start(q, cell)
+    labels, there = _labels(program), True
     for index, motion in enumerate(program.motions):
-        verdict = Verdict(label=f"line {motion.line} {motion.command}", index=index, s=gone)
+        verdict = Verdict(label=labels[index], index=index, s=gone, line=motion.line, command=motion.command)
         late = replace(verdict, why="not reached", text="the program has failed before")
+        target = motion.q if motion.q is not None else _near(motion.X_BT, q)
         if index == 0 and start:
             verdicts.append(replace(verdict, why="stale start", text=f"{start}; say where it really stands (--start)"))
-            q_worst, p_worst, failed, q = cell.q_start, torch_pose(cell.q_start).p, True, motion.q
+            q_worst, p_worst, failed = cell.q_start, torch_pose(cell.q_start).p, True
+            there, q = target is not None, q if target is None else target
             continue
-        if q is None:
-            verdicts.append(late)
-            q = motion.q
-            continue
-        way = _way(motion, q, index == 0 or program.motions[index - 1].command != "servoj")
-        checked, q_at = _checked(verdict, way, cell)
+        fresh = index == 0 or program.motions[index - 1].command != "servoj"
+        way = _way(motion, q, fresh, index == 0) if there else _target(motion, target, q)
+        checked, q_at = _checked(verdict, way, cell, failed)
         verdicts.append(late if failed and checked.ok else checked)
-        tips = torch_pose(way.q).p
-        gone += float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())
-        length = length if failed else gone
-        if not checked.ok:
+        if there:
+            tips = torch_pose(way.q).p
+            gone += float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())
+            length = length if failed else gone
+        if not checked.ok or not there:
             if not failed:
                 q_worst = q_at
                 p_worst = torch_pose(q_at).p if motion.X_BT is None or checked.why == "collision" else motion.X_BT.p
             failed = True
-            q = motion.q if motion.q is not None else _near(motion.X_BT, q)
+            there, q = target is not None, q if target is None else target
             continue
         if not failed:
             t.append(clock + np.linspace(0, way.duration, len(way.q))[1:])
@@ -122,30 +126,88 @@ def _bad_start(q: Float[ndarray, "6"], cell: Cell) -> str:
     return f"where the arm stands {touch}" if (touch := cell.collision(q)) is not None else ""
 
 
-def _checked(verdict: Verdict, way: _Way, cell: Cell) -> tuple[Verdict, Float[ndarray, "6"]]:
-    """The verdict of a motion, and how the arm stands where it fails, or in the end [rad]."""
+def _labels(program: Program) -> list[str]:
+    """What each motion is called; of a line that moves several times also which of its motions it is."""
+    names = [f"line {motion.line} {motion.command}" for motion in program.motions]
+    count, seen, out = Counter(names), Counter[str](), []
+    for name in names:
+        seen[name] += 1
+        out.append(name if count[name] == 1 else f"{name} ({seen[name]} of {count[name]})")
+    return out
+
+
+def _target(motion: Motion, target: Float[ndarray, "6"] | None, q: Float[ndarray, "6"]) -> _Way:
+    """A motion from nobody knows where: its target and speed alone. Args: q, where the arm was last [rad]."""
+    if target is None:
+        return _Way(q=q[None], duration=0.0, why="unreachable", text=_unreached(motion))
+    if np.abs(target).max() > JOINT_LIMIT:
+        return _beyond(target[None], target, 0.0)
+    text = "" if motion.t or motion.command == "servoj" else _too_fast(motion.speed, motion)
+    return _Way(q=target[None], duration=0.0, why="speed" if text else "ok", text=text)
+
+
+def _too_fast(speed: float, motion: Motion) -> str:
+    """What is wrong with a speed, of the leading joint in a movej [rad/s], else of the tip [m/s]; "" where nothing is."""
+    if motion.command == "movej":
+        fast = speed > SPEED_LIMIT + 1e-6
+        return f"{np.rad2deg(speed):.0f} deg/s asked for (limit {np.rad2deg(SPEED_LIMIT):.0f} deg/s)" if fast else ""
+    fast = motion.arc and speed > FASTEST
+    return f"{1e3 * speed:.0f} mm/s with the arc on (limit {1e3 * FASTEST:.0f} mm/s)" if fast else ""
+
+
+def _checked(verdict: Verdict, way: _Way, cell: Cell, failed: bool) -> tuple[Verdict, Float[ndarray, "6"]]:
+    """The verdict of a motion, and how the arm stands where it fails, or in the end [rad].
+
+    Args:
+        failed: whether a motion before it has: then what the arm touches from the beginning of its way on is no fault of this one,
+            unless it ends there.
+    """
     at = min(way.at, len(way.q) - 1)
-    found = first_touch(way.q, cell.collision) if len(way.q) > 1 else None
-    if found is None or (way.why != "ok" and found[0] > way.at):
+    first = _first_clear(way.q, cell) if failed else 0
+    found = first_touch(way.q[first:], cell.collision)
+    carried_on = failed and first == len(way.q) - 1
+    if found is None or (carried_on and way.why != "ok"):
         return replace(verdict, why=way.why, text=way.text), way.q[at]
-    at = min(int(np.ceil(found[0])), len(way.q) - 1)
-    q_hit = way.q[at - 1] + (found[0] - at + 1) * (way.q[at] - way.q[at - 1]) if at else way.q[0]
+    hit_at = found[0] + first
+    near = min(int(np.ceil(hit_at)), len(way.q) - 1)
+    q_hit = way.q[near - 1] + (hit_at - near + 1) * (way.q[near] - way.q[near - 1]) if near else way.q[0]
     hit = cell.collision.touch(q_hit)
-    first, second, depth = ("", "", 0.0) if hit is None else (hit.first, hit.second, hit.depth)
-    text = f"{found[1]}, {100 * found[0] / (len(way.q) - 1):.0f} % of the way"
-    return replace(verdict, why="collision", text=text, first=first, second=second, depth=depth), q_hit
+    first_name, second, depth = ("", "", 0.0) if hit is None else (hit.first, hit.second, _deepest(way.q[near:], hit, cell))
+    text = str(found[1] if hit is None else replace(hit, depth=depth))
+    if depth - (0.0 if hit is None else hit.depth) >= SHALLOW:
+        text = text.replace("(", "(up to ", 1)
+    if carried_on and len(way.q) > 1:
+        text += ", all the way"
+    elif len(way.q) > 1:
+        text += f", first at {100 * hit_at / (len(way.q) - 1):.0f} % of the way"
+    if way.why != "ok" and hit_at > way.at:
+        return replace(verdict, why=way.why, text=f"{way.text}; and {text}"), way.q[at]
+    text += f"; and {way.text}" if way.text else ""
+    return replace(verdict, why="collision", text=text, first=first_name, second=second, depth=depth), q_hit
 
 
-def _way(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
-    """The motion from q; `fresh` where no servoj came before it."""
+def _first_clear(q: Float[ndarray, "n 6"], cell: Cell) -> int:
+    """Index of the first posture that touches nothing; of the last where none is clear."""
+    return next((i for i, posture in enumerate(q) if cell.collision.touch(posture) is None), len(q) - 1)
+
+
+def _deepest(q: Float[ndarray, "n 6"], hit: Touch, cell: Cell) -> float:
+    """How deep the two bodies of a contact get at these postures [m], at least as deep as in it."""
+    touches = (cell.collision.touch(posture) for posture in q)
+    same = (touch.depth for touch in touches if touch is not None and (touch.first, touch.second) == (hit.first, hit.second))
+    return max([hit.depth, *same])
+
+
+def _way(motion: Motion, q: Float[ndarray, "6"], fresh: bool, first: bool) -> _Way:
+    """The motion from q; `fresh` where no servoj came before it, `first` where nothing did."""
     if motion.command == "servoj":
-        return _servo(motion, q, fresh)
+        return _servo(motion, q, fresh, first)
     if motion.command == "movej":
         return _joint_move(motion, q)
     return _straight(motion, q)
 
 
-def _servo(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
+def _servo(motion: Motion, q: Float[ndarray, "6"], fresh: bool, first: bool) -> _Way:
     target = motion.q if motion.q is not None else _near(motion.X_BT, q)
     if target is None:
         return _Way(q=q[None], duration=0.0, why="unreachable", text=_unreached(motion))
@@ -156,8 +218,9 @@ def _servo(motion: Motion, q: Float[ndarray, "6"], fresh: bool) -> _Way:
     if np.abs(target).max() > JOINT_LIMIT:
         return _beyond(way, target, motion.t)
     if fresh and step[joint] > STALE:
+        standing = ", or say where it really stands (--start)" if first else ""
         text = f"servoj begins {turn:.1f} deg of {name} away from where the arm stands (limit {np.rad2deg(STALE):.1f} deg)"
-        return _Way(q=way, duration=motion.t, why="stale start", text=f"{text}; movej there first", at=len(way) - 1)
+        return _Way(q=way, duration=motion.t, why="stale start", text=f"{text}; movej there first{standing}", at=len(way) - 1)
     if step[joint] > SERVO_JUMP:
         text = f"{name} jumps {turn:.1f} deg to this target (limit {np.rad2deg(SERVO_JUMP):.1f} deg)"
         return _Way(q=way, duration=motion.t, why="joint jump", text=text, at=len(way) - 1)
@@ -177,8 +240,7 @@ def _joint_move(motion: Motion, q: Float[ndarray, "6"]) -> _Way:
     if np.abs(target).max() > JOINT_LIMIT:
         return _beyond(way, target, duration)
     fastest = turn / duration if motion.t else motion.speed
-    if turn > 1e-6 and fastest > SPEED_LIMIT + 1e-6:
-        text = f"{np.rad2deg(fastest):.0f} deg/s asked for (limit {np.rad2deg(SPEED_LIMIT):.0f} deg/s)"
+    if turn > 1e-6 and (text := _too_fast(fastest, motion)):
         return _Way(q=way, duration=duration, why="speed", text=text)
     return _Way(q=way, duration=duration)
 
@@ -212,8 +274,8 @@ def _straight(motion: Motion, q: Float[ndarray, "6"]) -> _Way:
             return replace(_beyond(np.array(way), found, 0.0), at=i)
         way.append(found)
     out = _Way(q=np.array(way), duration=duration)
-    if motion.arc and fastest > FASTEST:
-        return replace(out, why="speed", text=f"{1e3 * fastest:.0f} mm/s with the arc on (limit {1e3 * FASTEST:.0f} mm/s)")
+    if text := _too_fast(fastest, motion):
+        return replace(out, why="speed", text=text)
     rates = np.abs(np.diff(out.q, axis=0)) * n / max(duration, 1e-9)
     if length > 1e-6 and not motion.t:
         rates = np.abs(np.diff(out.q, axis=0)) * n / max(length, 1e-9) * min(motion.speed, np.sqrt(motion.acceleration * length))
@@ -264,7 +326,8 @@ def _beyond(way: Float[ndarray, "n 6"], target: Float[ndarray, "6"], duration: f
 
 def _unreached(motion: Motion, p: Float[ndarray, "3"] | None = None) -> str:
     p = p if p is not None else (motion.X_BT.p if motion.X_BT is not None else np.full(3, np.nan))
-    return f"no joint solution for the torch at ({p[0]:.3f}, {p[1]:.3f}, {p[2]:.3f}) m in base"
+    x, y, z = np.round(p, 3) + 0.0
+    return f"no joint solution for the torch at ({x:.3f}, {y:.3f}, {z:.3f}) m in base"
 
 
 def _trapezoid(distance: float, speed: float, acceleration: float) -> float:

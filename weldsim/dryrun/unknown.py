@@ -82,6 +82,10 @@ def _store(value: Any, indices: tuple[Any, ...], new: Any) -> None:
 
 
 def _method(target: Any, name: str, arguments: list[Any]) -> Unknown:
+    if isinstance(target, list):
+        raise ScriptError(
+            f".{name}(): a list's own functions are not modelled; write the list out, and get_list_length(list) for .length()"
+        )
     if not isinstance(target, Unknown):
         raise ScriptError(f".{name}(): only a handle of rpc_factory has functions of its own")
     return Unknown(f"{target.what}.{name}")

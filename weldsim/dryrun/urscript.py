@@ -5,9 +5,11 @@ unknown: waits, choices and threads that depend on it and move nothing are passe
 it cannot be told beforehand and is refused where they begin to.
 """
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from functools import wraps
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -37,6 +39,9 @@ TURNS = 10_000  # of all loops together; more is a program that does not end
 LOOKED_AFTER, REPEATS, LONGEST_ROUND = 1000, 4, 500  # turns; rounds that must be alike, and motions of one at most
 FURTHEST, LONGEST_TOOL, LONGEST_TURN = 3.0, 1.0, 2 * np.pi + 1e-6  # [m] of a pose from the base, of a TCP from the flange; [rad]
 LARGEST_ANGLE = 8 * np.pi  # [rad] of a joint
+DECIMAL = r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*"
+JOINT_LIST = re.compile(rf"(?<!p)\[({DECIMAL}(?:,{DECIMAL}){{5}})\]")  # six numbers that are no pose
+STARTS = 20  # of them that are tried
 
 
 def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_start: Float[ndarray, "6"] | None = None) -> Program:
@@ -50,16 +55,11 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
         InputError: a line that cannot be read, a function nobody knows, a target that is not finite or in millimetres, motions
             that cannot be told beforehand, no motion.
     """
-    recorder = _Recorder(X_FT, q_start)
-    try:
-        program = compile_program(text.replace("\r\n", "\n").replace("\r", "\n"), recorder.builtins(), moving=MOVES)
-        recorder.run(program)
-    except ScriptError as error:
-        where = f"line {error.line}: " if error.line else ""
-        raise InputError(f"{source}: {where}{error.reason}", path=source, line=error.line) from None
-    if not recorder.motions and recorder.halted:
-        said = f": {recorder.shown}" if recorder.shown else ""
-        raise InputError(f"{source}: halts before it moves{said}", path=source)
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    recorder = _recorded(text, source, X_FT, q_start)
+    if len(recorder.motions) < 2 and recorder.halted_at is not None:
+        advice = _how_to_start(text, source, X_FT, recorder)
+        raise InputError(f"{source}: {recorder.halted}{advice}", path=source, line=recorder.halted_at)
     if not recorder.motions and recorder.effects is not None and (movers := recorder.effects.movers()):
         raise InputError(
             f"{source}: never calls what it defines ({', '.join(movers)[:80]}), so nothing moves; end it with the call that is"
@@ -70,6 +70,13 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
         raise InputError(f"{source}: makes no movej, movel, movep, movec or servoj; there is nothing to check", path=source)
     if len(recorder.motions) < 2:
         raise InputError(f"{source}: 1 motion; a path needs two", path=source)
+    if recorder.effects is not None:
+        for name, line in recorder.effects.moving_threads():  # one that runs is refused
+            recorder.notes.add(
+                f"thread {name}", f"line {line}: thread {name} would move the arm, but is never run: its motions are not checked"
+            )
+    if recorder.halted_at is not None:
+        recorder.notes.add("halt", f"{recorder.halted}; what comes after it is not read")
     return Program(
         source=source.rpartition("/")[2],
         kind="script",
@@ -77,7 +84,44 @@ def parse_script(text: str, *, source: str, X_FT: Transform | None = None, q_sta
         X_FT=recorder.state.mount,
         pauses=recorder.pauses,
         notes=recorder.notes.sentences(),
+        from_start=_from_start(recorder),
     )
+
+
+def _recorded(text: str, source: str, X_FT: Transform | None, q_start: Float[ndarray, "6"] | None) -> "_Recorder":
+    """What a program was asked for. Raises InputError."""
+    recorder = _Recorder(X_FT, q_start)
+    try:
+        recorder.run(compile_program(text, recorder.builtins(), moving=MOVES))
+    except ScriptError as error:
+        where = f"line {error.line}: " if error.line else ""
+        raise InputError(f"{source}: {where}{error.reason}", path=source, line=error.line) from None
+    return recorder
+
+
+def _how_to_start(text: str, source: str, X_FT: Transform | None, halted: "_Recorder") -> str:
+    """What makes a program go on that halts by how the arm stands: joint angles that it holds itself and with which it moves."""
+    if not halted.state.asked:
+        return "; take the halt out to have what follows checked"
+    for found in islice(dict.fromkeys(JOINT_LIST.findall(text)), STARTS):
+        said = ", ".join(f"{float(value):.4f}" for value in found.split(","))
+        try:
+            moves = _recorded(text, source, X_FT, np.array([float(value) for value in said.split(",")])).motions
+        except InputError:
+            continue
+        if len(moves) > 1:
+            return f'; with --start "{said}" it goes on'
+    return f"; it asks where the arm stands ({halted.state.asked}): say that with --start"
+
+
+def _from_start(recorder: "_Recorder") -> str:
+    """What of a program depends on how the arm stands when it begins, or ""."""
+    first = recorder.motions[0]
+    if recorder.state.asked:
+        return f"the program asks where the arm stands before its first motion ({recorder.state.asked})"
+    if first.command == "movej" and first.q is not None:
+        return ""
+    return f"line {first.line}: the first motion is a {first.command}{'' if first.q is not None else ' to a pose'}"
 
 
 class _HaltError(Exception):
@@ -86,11 +130,12 @@ class _HaltError(Exception):
 
 class _Recorder:
     """A program's functions. Attributes: motions, what they wrote down; state, of the robot by then; pauses [s]; notes;
-    halted, whether it said so; shown, the last popup."""
+    halted_at, the line where it said so, or None; shown, the last popup."""
 
     def __init__(self, fixed: Transform | None, q_start: Float[ndarray, "6"] | None) -> None:
         self.fixed, self.state = fixed, RobotState(X_FT if fixed is None else fixed, q_start)
-        self.halted, self.shown = False, ""
+        self.halted_at: int | None = None
+        self.shown = ""
         self.motions: list[Motion] = []
         self.notes = ScriptNotes()
         self.pauses = 0.0
@@ -112,7 +157,7 @@ class _Recorder:
             for _ in names["main"]():
                 pass
         except _HaltError:
-            self.halted = True
+            pass
         except ScriptError as error:
             raise ScriptError(error.reason, error.line or self._line(error)) from None
         except (TypeError, ValueError, ArithmeticError, NameError, LookupError, RecursionError) as error:
@@ -280,7 +325,14 @@ class _Recorder:
         self.notes.passed_over(untold.what, self._line() or 0, wait=kind == "While")
         return Unknown(untold.what)
 
+    @property
+    def halted(self) -> str:
+        """In words where the program halts, and after what."""
+        done = f"after {len(self.motions)} motion{'s' if len(self.motions) > 1 else ''}" if self.motions else "before it moves"
+        return f"line {self.halted_at}: halts {done}" + (f": {self.shown.rstrip('.')}" if self.shown else "")
+
     def _halt(self) -> Iterator[None]:
+        self.halted_at = self._line() or 0
         raise _HaltError
         yield
 

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from weldsim.dryrun.margin import Margin, margin_json
+from weldsim.motion.collision import SHALLOW, deep
 from weldsim.records import JointTrajectory
 
 Why = Literal[
@@ -25,6 +26,10 @@ Why = Literal[
 ]
 
 
+EVENTS: tuple[Why, ...] = ("orientation jump", "turns back", "joint jump", "stale start")  # at one waypoint, each its own
+STREAMED = ("", "servoj")  # commands whose targets follow each other closely, as the poses of a path do
+
+
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
     """What becomes of one waypoint.
@@ -33,6 +38,7 @@ class Verdict:
         label: which one, for people.  index: from 0.  s: arc length [m], or None for a joint target.
         why: "ok" or the kind of failure.  text: the reason in full, with values and limits.
         first, second: bodies that collide.  depth: how deep [m].
+        line: of a robot program's motion, from 1; 0 of a path's pose.  command: of such a motion.
     """
 
     label: str
@@ -43,6 +49,8 @@ class Verdict:
     first: str = ""
     second: str = ""
     depth: float = 0.0
+    line: int = 0
+    command: str = ""
 
     @property
     def ok(self) -> bool:
@@ -141,14 +149,42 @@ class DryRun:
 
 
 def runs(verdicts: tuple[Verdict, ...]) -> list[tuple[Verdict, Verdict]]:
-    """First and last of each run of neighbouring verdicts of one kind with the same bodies; the first with the greatest depth."""
-    out: list[tuple[Verdict, Verdict]] = []
+    """First and last of each run of neighbouring verdicts that are told as one; the first with the greatest depth.
+
+    Those are verdicts of one kind with the same bodies. A failure that has a reason of its own, such as a jump or a whole
+    motion of a program, is a run alone.
+    """
+    out: list[tuple[Verdict, Verdict, float]] = []
     for verdict in verdicts:
-        if out and (out[-1][0].why, out[-1][0].first, out[-1][0].second) == (verdict.why, verdict.first, verdict.second):
-            out[-1] = (replace(out[-1][0], depth=max(out[-1][0].depth, verdict.depth)), verdict)
+        if out and _told_as_one(out[-1][0], verdict):
+            out[-1] = (out[-1][0], verdict, max(out[-1][2], verdict.depth))
         else:
-            out.append((verdict, verdict))
-    return out
+            out.append((verdict, verdict, verdict.depth))
+    return [(_with_depth(first, depth), last) for first, last, depth in out]
+
+
+def _told_as_one(a: Verdict, b: Verdict) -> bool:
+    if (a.why, a.first, a.second) != (b.why, b.first, b.second):
+        return False
+    return a.why in ("ok", "not reached") or (a.why not in EVENTS and a.command in STREAMED and b.command in STREAMED)
+
+
+def _with_depth(first: Verdict, depth: float) -> Verdict:
+    """The first of a run, saying how deep the bodies get in it [m]."""
+    if depth - first.depth < SHALLOW:
+        return first
+    return replace(first, depth=depth, text=f"{first.text}; up to {deep(depth)} further on")
+
+
+def span(first: Verdict, last: Verdict) -> str:
+    """The waypoints of a run in words."""
+    if first.index == last.index:
+        return first.label
+    if not first.line:
+        return f"{first.label} to {last.index}"
+    if last.line > first.line:
+        return f"{first.label} to {last.label}"
+    return f"{first.label} and the {last.index - first.index} after it"
 
 
 def dry_run_json(result: DryRun) -> dict[str, Any]:

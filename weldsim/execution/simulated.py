@@ -199,6 +199,7 @@ class SimulatedRobot(Robot):
                 pair = (bodies[0], bodies[1])
                 if pair not in touching and pair not in self._touching:
                     depth = -1e3 * float(self.data.contact.dist[k])
-                    self._events.append(Event(t=self.t, kind="contact", text=f"{pair[0]} touches {pair[1]} ({depth:.2f} mm deep)"))
+                    said = f"{depth:.2f}" if depth >= 0.005 else "under 0.01"
+                    self._events.append(Event(t=self.t, kind="contact", text=f"{pair[0]} touches {pair[1]} ({said} mm deep)"))
                 touching.add(pair)
         self._touching = touching

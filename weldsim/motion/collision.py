@@ -13,6 +13,7 @@ from weldsim.kinematics import JOINT_NAMES
 
 ARM_ROOT = "ur5_base"
 NEAR = 0.03  # [m] gaps wider than this count as this
+SHALLOW = 5e-5  # [m] what rounds to 0.0 mm
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +26,12 @@ class Touch:
 
     def __str__(self) -> str:
         first, second = in_words(self.first), in_words(self.second)
-        return f"{first} touches {second} ({1e3 * self.depth:.1f} mm deep)" if second else first
+        return f"{first} touches {second} ({deep(self.depth)})" if second else first
+
+
+def deep(depth: float) -> str:
+    """A depth [m] in words."""
+    return f"{1e3 * depth:.1f} mm deep" if depth >= SHALLOW else f"under {2e3 * SHALLOW:.1f} mm deep"
 
 
 def in_words(name: str) -> str:

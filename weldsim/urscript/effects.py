@@ -40,6 +40,15 @@ class Effects:
             self._moves[name] = self.moves(self._scopes.functions[name].body)
         return self._moves[name]
 
+    def moving_threads(self) -> tuple[tuple[str, int], ...]:
+        """Names and lines of the threads that would move the arm."""
+        functions = self._scopes.functions.items()
+        return tuple(
+            (name, function.line)
+            for name, function in functions
+            if function.kind == "thread" and self.function_moves(name) is not None
+        )
+
     def movers(self) -> tuple[str, ...]:
         """The functions of the program that move the arm, those that can be called without arguments last."""
         functions = self._scopes.functions.items()

@@ -62,6 +62,85 @@ def test_a_servoj_that_begins_elsewhere(tmp_path) -> None:
     assert try_script(read_program(file), cell).passed
 
 
+WAITS = "[0.500000, -1.300000, -1.900000, -1.500000, 1.570000, 0.000000]"
+GUARDED = f"""def job():
+  q = get_actual_joint_positions()
+  there = {WAITS}
+  if norm(q[0] - there[0]) > 0.01 or norm(q[2] - there[2]) > 0.01:
+    popup("Not at the start.")
+    halt
+  end
+  movej({WAITS})
+  movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.01, 0, 0, 0]), v=0.05)
+end
+"""
+
+
+def test_a_program_that_halts_by_where_the_arm_stands_goes_on_from_the_start_that_is_named(tmp_path, capsys) -> None:
+    file = tmp_path / "job.script"
+    file.write_text(GUARDED)
+    assert main(["dry-run", str(file), "--no-fix"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert said.startswith(f"weldsim: {file}: line 6: halts before it moves: Not at the start; with --start ")
+    assert main(["dry-run", str(file), "--no-fix", "--start", said.split('"')[1]]) == 0
+    assert "--start" not in capsys.readouterr().out
+    file.write_text(GUARDED.replace(f"there = {WAITS}", "there = [0.5, 0, -1.9]").replace(f"movej({WAITS})", "movej(q)"))
+    assert main(["dry-run", str(file), "--no-fix"]) == 2
+    assert "it asks where the arm stands (get_actual_joint_positions): say that with --start" in capsys.readouterr().err
+    assert main(["dry-run", str(file), "--no-fix", "--start", WAITS[1:-1]]) == 0
+
+
+def test_a_program_that_halts_whatever_the_arm_does(tmp_path, capsys) -> None:
+    file = tmp_path / "job.script"
+    for before, count in (("", "before it moves"), (f"movej({HOME_TEXT})\n", "after 1 motion")):
+        text = f'{before}popup("no wire")\nhalt\nmovej({HOME_TEXT})\nmovel({POSE}, v=0.1)\n'
+        file.write_text(text)
+        assert main(["dry-run", str(file), "--no-fix"]) == 2
+        assert f"halts {count}: no wire; take the halt out to have what follows checked" in capsys.readouterr().err
+        file.write_text(text.replace("halt\n", ""))
+        assert main(["dry-run", str(file), "--no-fix"]) == 0
+        capsys.readouterr()
+
+
+def test_what_follows_a_halt_is_told_to_be_unread(tmp_path) -> None:
+    file = tmp_path / "job.script"
+    file.write_text(f"movej({HOME_TEXT})\nmovel({POSE}, v=0.1)\nhalt\nmovel(p[0, -2, 0, 0, 0, 0])\n")
+    program = read_program(file)
+    assert len(program.motions) == 2
+    assert "line 3: halts after 2 motions; what comes after it is not read" in program.notes
+
+
+@pytest.mark.parametrize(
+    ("first", "noted"),
+    [
+        (f"movel({POSE}, v=0.1)", "line 1: the first motion is a movel to a pose"),
+        (f"movej({POSE})", "line 1: the first motion is a movej to a pose"),
+        (f"movel({HOME_TEXT}, v=0.1)", "line 1: the first motion is a movel"),
+        ("movej(get_actual_joint_positions())", "the program asks where the arm stands before its first motion"),
+        (f"movej({HOME_TEXT})", ""),
+    ],
+)
+def test_a_program_that_begins_where_the_arm_stands_says_where_that_is_taken_to_be(tmp_path, capsys, first, noted) -> None:
+    file = tmp_path / "job.script"
+    file.write_text(f"{first}\nmovel({POSE}, v=0.1)\n")
+    main(["dry-run", str(file), "--no-fix"])
+    out = capsys.readouterr().out
+    assert ("--start says where it does" in out) == bool(noted)
+    assert noted in out
+    main(["dry-run", str(file), "--no-fix", "--start", HOME_TEXT[1:-1]])
+    assert "--start" not in capsys.readouterr().out
+
+
+def test_a_servoj_that_begins_where_the_arm_is_said_to_stand(tmp_path) -> None:
+    file = tmp_path / "job.script"
+    file.write_text(f"servoj({WAITS}, t=0.008)\nservoj({WAITS}, t=0.008)\n")
+    failure = try_script(read_program(file), empty_cell(np.array(HOME))).failure
+    assert failure is not None
+    assert "or say where it really stands (--start)" in failure.text
+    there = np.array([float(q) for q in WAITS[1:-1].split(",")])
+    assert try_script(read_program(file), empty_cell(there)).passed
+
+
 @pytest.mark.parametrize("name", ["job.script", "job.csv"])
 def test_an_arm_that_is_said_to_stand_in_the_table(tmp_path, capsys, name) -> None:
     file = tmp_path / name
@@ -111,7 +190,11 @@ def test_a_turn_in_place_is_a_jump_and_every_one_is_told() -> None:
     [
         ("0,1,-0,45,0,1,3,1,0,0,0,01", "decimal commas need ; between the columns", "0,1;-0,45;0,1;3,1;0,0;0,01"),
         ("7,0.1,-0.45,0.1,3.1,0,0.01,99", "name them on the first line", "n,x,y,z,rx,ry,rz,i\n7,0.1,-0.45,0.1,3.1,0,0.01,99"),
-        ("x [mm],y,z,rx,ry,rz\n100,-0.45,0.1,3.1,0,0.01", "metres and radians", "x [m],y,z,rx,ry,rz\n0.1,-0.45,0.1,3.1,0,0.01"),
+        (
+            "x [mm],y,z,rx,ry,rz\n100,-0.45,0.1,3.1,0,0.01",
+            "give each of them the same",
+            "x [m],y,z,rx,ry,rz\n0.1,-0.45,0.1,3.1,0,0.01",
+        ),
         ("X,Y,Z,A,B,C\n0.1,-0.45,0.1,3.1,0,0.01", "x y z rx ry rz", "X,Y,Z,RX,RY,RZ\n0.1,-0.45,0.1,3.1,0,0.01"),
     ],
 )

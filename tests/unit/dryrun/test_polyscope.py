@@ -159,3 +159,20 @@ def test_waypoints_as_joints_of_poses_are_read_with_the_tool_that_is_said() -> N
     q = flange.motions[1].q
     assert q is not None
     assert flange_pose(q).p == pytest.approx([0.0, -0.45, 0.3], abs=1e-6)
+
+
+def test_a_thread_that_would_move_and_is_never_run_is_told() -> None:
+    idle = "  thread lift():\n    movel(p[0, -2, 0, 0, 0, 0])\n  end\n"
+    line = exported(HEAD_5, idle).splitlines().index("  thread lift():") + 1
+    told = f"line {line}: thread lift would move the arm, but is never run: its motions are not checked"
+    assert told in parse(exported(HEAD_5, idle)).notes
+    assert not any("never run" in note for note in parse(exported(HEAD_5, COUNTER)).notes)
+
+
+def test_a_list_s_own_functions_are_named_and_the_advice_works() -> None:
+    a, b = ("p[0.0, -0.45, 0.3, 0.0, 3.14, 0.0]", "p[0.05, -0.45, 0.3, 0.0, 3.14, 0.0]")
+    loop = "i = 0\nwhile i < {}:\n  movel(all[i], v=0.1)\n  i = i + 1\nend\n"
+    for text in (f"all = [{a}]\nall.append({b})\n" + loop.format(2), f"all = [{a}, {b}]\n" + loop.format("all.length()")):
+        with pytest.raises(InputError, match=r"line \d: \.\w+\(\): a list's own functions are not modelled; write the list out"):
+            parse(text)
+    assert len(parse(f"all = [{a}, {b}]\n" + loop.format("get_list_length(all)")).motions) == 2

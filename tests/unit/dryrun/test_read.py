@@ -180,7 +180,7 @@ def test_a_script_is_read_in_the_order_in_which_it_moves(tmp_path, newline):
         ("p.csv", f"{POSE}\nnan,0,0,0,0,0\n", "line 2"),
         ("p.csv", f"{POSE}\n12.0,-450.0,100.0,3.1,0,0\n", "millimetres"),
         ("p.csv", f"{POSE}\n0,-0.45,0.1,180.0,0,0\n", "degrees"),
-        ("p.csv", f"x [mm],y,z,rx,ry,rz\n{POSE}\n{POSE}\n", "line 1: column x is in mm"),
+        ("p.csv", f"x [mm],y,z,rx,ry,rz\n{POSE}\n{POSE}\n", "y, z are not all in one unit"),
         ("p.csv", f"{POSE}\n{POSE}\n".replace(".", ","), "line 1: .* columns"),
         ("p.csv", f"{POSE}\n{POSE}\n", "all 2 poses are in one place"),
         ("p.json", json.dumps(_document(poses=[{**p, "s": 1e3 * p["s"]} for p in _poses()])), "arc length in metres"),
