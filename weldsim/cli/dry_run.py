@@ -11,6 +11,7 @@ from weldsim.cli.options import ConfigOptions, choose_platform, keep_importable,
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.quantities import JOINTS, LEANED, MOVED, TURNED, WELD_SPEED, quantities, quantity
 from weldsim.cli.show import print_json, progress, table
+from weldsim.counted import counted
 from weldsim.dryrun.names import Base, Tool
 from weldsim.errors import InputError, SensorError
 
@@ -259,7 +260,7 @@ class DryRunCommand(ConfigOptions):
             print(f"  {note}")
         for trial, fixes in zip(result.trials, result.fixes, strict=True):
             state = f"{trial.cycle:.1f} s" if trial.passed else "fails"
-            print(f"  {trial.name}: {len(trial.verdicts)} waypoints, {units.to_mm(trial.length):.0f} mm, {state}")
+            print(f"  {trial.name}: {counted(len(trial.verdicts), 'waypoint')}, {units.to_mm(trial.length):.0f} mm, {state}")
             if rows := failures(trial):
                 print(table(rows, ("waypoint", "s", "verdict", "reason")))
             if trial.margins:

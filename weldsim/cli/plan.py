@@ -11,6 +11,7 @@ from weldsim.cli.options import ConfigOptions, Method, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
 from weldsim.cli.quantities import COUNT, POINT, quantities, quantity
 from weldsim.cli.show import Tell, progress, reasons_refused, table, times
+from weldsim.counted import counted
 from weldsim.errors import CloudError, InputError, NoSeamError, PathError
 
 if TYPE_CHECKING:
@@ -262,7 +263,7 @@ class Plan(ConfigOptions):
         from weldsim.pipeline import unplanned
 
         found, method = len(result.findings.seams), chosen.findings.method
-        print(f"{self.cloud.name}: {len(result.cloud)} points, {found} seam{'' if found == 1 else 's'}, method {method}")
+        print(f"{self.cloud.name}: {counted(len(result.cloud), 'point')}, {counted(found, 'seam')}, method {method}")
         rows = []
         for number, seam, path in zip(numbers, chosen.findings.seams, chosen.paths, strict=True):
             sigma = "-" if seam.sigma is None else f"{units.to_mm(float(np.median(seam.sigma))):.3f} mm"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy import ndarray
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.dryrun.margin import Margin
 from weldsim.dryrun.margins import joint_speeds
 from weldsim.dryrun.verdict import DryRun, Fix, Trial, Verdict, runs
@@ -52,7 +53,7 @@ def _broken(fix: Fix) -> str:
 
 def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[dict[str, Any]], speed_limit: float) -> str:
     failure = trial.failure
-    said = f"{units.to_mm(trial.length):.0f} mm long, {len(trial.verdicts)} waypoints"
+    said = f"{units.to_mm(trial.length):.0f} mm long, {counted(len(trial.verdicts), 'waypoint')}"
     parts = [f"<section><h2>{escape(trial.name)}: {'would pass' if failure is None else 'would fail'}</h2><p>{escape(said)}</p>"]
     if failure is not None:
         parts.append(f'<ul class="reasons"><li>{escape(place(failure))}: {escape(failure.why)}: {escape(failure.text)}</li></ul>')

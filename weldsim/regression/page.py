@@ -5,11 +5,12 @@ from html import escape
 from pathlib import Path
 
 from weldsim import __version__
+from weldsim.counted import counted
 from weldsim.output import write_whole
 from weldsim.regression.figures import FIGURES
 from weldsim.regression.job import Row
 from weldsim.regression.suite import Regression
-from weldsim.regression.text import HEAD, counted, number, rows_of_text, sentence, shift_sentence, unjudged
+from weldsim.regression.text import HEAD, number, rows_of_text, sentence, shift_sentence, unjudged
 from weldsim.report.html import STYLE
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"

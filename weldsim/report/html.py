@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
 from weldsim.report import figures
@@ -180,7 +181,7 @@ def _cards(report: WeldReport, findings: SeamFindings, welded: int) -> str:
             cards.append((f"{units.to_mm(float(seam.sigma.mean())):.2f} mm", "sigma across, mean"))
         if seam.gaps:
             missing = sum(s1 - s0 for s0, s1 in seam.gaps)
-            cards.append((f"{units.to_mm(missing):.1f} mm", f"not measured, in {len(seam.gaps)} gap{'s'[: len(seam.gaps) > 1]}"))
+            cards.append((f"{units.to_mm(missing):.1f} mm", f"not measured, in {counted(len(seam.gaps), 'gap')}"))
     for name, error in (("plan", report.plan), ("executed", report.executed)):
         if error is not None:
             cards.append((f"{units.to_mm(error.mean):.2f} mm", f"{name} from the known {error.reference}, mean"))

@@ -16,6 +16,7 @@ from matplotlib.patheffects import withStroke
 from numpy import ndarray
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import ReportConfig
@@ -99,7 +100,7 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, welded
         ha="right",
     )
     count = len(findings.seams)
-    facts = [f"{count} seam{'' if count == 1 else 's'}", f"method {report.method}"]
+    facts = [counted(count, "seam"), f"method {report.method}"]
     if count:
         seam = findings.seams[welded]
         facts.append(f"{'' if count == 1 else f'seam {welded + 1}: '}{units.to_mm(seam.length):.1f} mm long")

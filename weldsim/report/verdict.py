@@ -3,6 +3,7 @@
 from typing import Literal
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.records import Pace, WeldReport
 from weldsim.report.limits import Check, ReportConfig, checks
 
@@ -29,7 +30,7 @@ def verdict(report: WeldReport, found: int, config: ReportConfig) -> tuple[str, 
         return f"{found} SEAM{'' if found == 1 else 'S'} FOUND", "no known seam to compare with"
     if report.warnings:
         others = len(report.warnings) - (0 < report.welded < report.seams)
-        return AMBER, part + kept + (f", {others} warning{'s'[: others > 1]}" if others else "")
+        return AMBER, part + kept + (f", {counted(others, 'warning')}" if others else "")
     return PASSED, part + kept
 
 
