@@ -22,7 +22,7 @@ from weldsim.path.files import path_document, write_path_csv, write_path_json
 from weldsim.pipeline import RunResult
 from weldsim.records import ExecutionLog
 from weldsim.report.html import write_html
-from weldsim.report.png import write_png
+from weldsim.report.png import png
 from weldsim.report.weld import report_json
 from weldsim.sensor.choose import SensorName, depth_step
 
@@ -114,8 +114,9 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     write_json(folder / "report.json", report_json(report, limits))
     seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": limits}
     others = {weld.seam: weld.log for weld in result.others}
-    write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, others=others, **seen)
-    write_png(folder / "report.png", report, plan.cloud, plan.findings, plan.paths, **seen)
+    picture = png(report, plan.cloud, plan.findings, plan.paths, **seen)
+    write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, others=others, still=picture, **seen)
+    write_whole(folder / "report.png", picture)
     if result.log is not None:
         write_whole(folder / "log.npz", log_bytes({result.welded: result.log, **others}))
     manifest = {

@@ -223,7 +223,7 @@ def test_a_run_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch, 
     def fail(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("weldsim.run_folder.write_png", fail)
+    monkeypatch.setattr("weldsim.run_folder.png", fail)
     assert main(["run", "plain", "--out", "old"]) == 2
     assert "No space left" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["old"]

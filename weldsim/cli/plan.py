@@ -222,8 +222,10 @@ class Plan(ConfigOptions):
     def _write_report(
         self, page: Path | None, picture: Path | None, chosen: "PlanResult", clock: "Clock", config: "CellConfig"
     ) -> None:
+        from weldsim.output import write_whole
         from weldsim.pipeline import unplanned
         from weldsim.report.html import write_html
+        from weldsim.report.png import png
         from weldsim.report.weld import weld_report
 
         report = weld_report(
@@ -235,13 +237,12 @@ class Plan(ConfigOptions):
             config_digest=chosen.config_digest,
             config=config.report,
         )
+        still = png(report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
         if page is not None:
             page.parent.mkdir(parents=True, exist_ok=True)
-            write_html(page, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+            write_html(page, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report, still=still)
         if picture is not None:
-            from weldsim.report.png import write_png  # matplotlib takes most of a second
-
-            write_png(picture, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+            write_whole(picture, still)
 
     def _print_json(self, document: dict[str, Any], result: "PlanResult") -> None:
         import numpy as np

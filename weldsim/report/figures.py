@@ -21,7 +21,8 @@ Figure = dict[str, Any]
 CLOUD_LIMIT = 60_000  # points drawn
 LONGEST = 1.0  # side of the scene, in units of plotly's camera
 SEEN = 0.68 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
-WIDER = 1.6  # how much wider than high a scene is on a narrow page
+WIDER = 1.6  # how much wider than high a scene is on a wide page
+NARROW = 1.3  # on a narrower one than this the eye stands back, chosen: titles of the axes are whole at 800 and at 1280 pixels
 POLE = 0.05  # [m] height of the mark where a weld was stopped, over the seam
 TICKS = 10  # on the longest side of the scene, fewer on shorter ones: they have to stand apart
 LINE_LIMIT = 3000  # samples drawn of one line
@@ -77,7 +78,7 @@ def scene(
     layout |= {
         "scene": {
             **{
-                f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}, "nticks": max(3, round(TICKS * side / LONGEST))}
+                f"{name}axis": {**axis, "title": {"text": f"{name} [mm]"}, "nticks": max(3, round(TICKS * side / LONGEST))}
                 for name, side in zip("xyz", shape, strict=True)
             },
             "aspectmode": "manual",
@@ -107,7 +108,7 @@ def _fitted(points_B: ndarray, towards: ndarray, up: ndarray) -> tuple[ndarray, 
 
 
 def uncertainty(seam: Seam) -> Figure:
-    """Standard deviation across the seam, and the width between the lips, along it."""
+    """Standard deviation across the seam, and the width between the lips, along it; each where it was measured."""
     s = 1e3 * seam.s
     data, top = [], {"yaxis": 0.0, "yaxis2": 0.0}
     if seam.sigma is not None:
@@ -118,17 +119,19 @@ def uncertainty(seam: Seam) -> Figure:
         top["yaxis2"] = 1.15 * float(width.max())
         data.append(_trace("width, right scale", s, width, WIRE, dash="dot", yaxis="y2"))
     layout = _layout("along the seam [mm]", "sigma [mm]")
-    layout["yaxis2"] = {
-        "overlaying": "y",
-        "side": "right",
-        "title": {"text": "width [mm]"},
-        "showgrid": False,
-        "tickmode": "auto",
-        "linecolor": GRID,
-    }
+    if top["yaxis2"] > 0:
+        layout["yaxis2"] = {
+            "overlaying": "y",
+            "side": "right",
+            "title": {"text": "width [mm]"},
+            "showgrid": False,
+            "tickmode": "auto",
+            "linecolor": GRID,
+        }
+        layout["margin"]["r"] = 56
     for axis, value in top.items():
-        layout[axis] |= {"range": [0.0, value]} if value > 0 else {"visible": False}
-    layout["margin"]["r"] = 56
+        if axis in layout:
+            layout[axis] |= {"range": [0.0, value]} if value > 0 else {"visible": False}
     layout["shapes"] = [  # what was not measured
         {"type": "rect", "xref": "x", "yref": "paper", "x0": 1e3 * s0, "x1": 1e3 * s1, "y0": 0, "y1": 1}
         | {"line": {"width": 0}, "fillcolor": "rgba(120,120,120,0.18)", "layer": "below"}

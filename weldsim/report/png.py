@@ -56,6 +56,21 @@ def write_png(
     config: ReportConfig | None = None,
 ) -> Path:
     """The picture written, 1600 x 900 pixels. Raises OutputError."""
+    return write_whole(path, png(report, cloud, findings, paths, log=log, known=known, welded=welded, config=config))
+
+
+def png(
+    report: WeldReport,
+    cloud: PointCloud,
+    findings: SeamFindings,
+    paths: tuple[TorchPath | None, ...],
+    *,
+    log: ExecutionLog | None = None,
+    known: tuple[KnownSeam, ...] = (),
+    welded: int = 0,
+    config: ReportConfig | None = None,
+) -> bytes:
+    """The picture as a PNG of 1600 x 900 pixels."""
     figure = Figure(figsize=(16, 9), dpi=100, facecolor="white")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, top=0.86, bottom=0.08, width_ratios=(1.75, 1), hspace=0.34, wspace=0.16)
@@ -82,7 +97,7 @@ def write_png(
         lower.set_axis_off()
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": "weldsim"})
-    return write_whole(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, welded: int, config: ReportConfig) -> None:
