@@ -199,6 +199,7 @@ class DryRunCommand(ConfigOptions):
 
         from weldsim.dryrun.verdict import dry_run_json
         from weldsim.output import write_whole
+        from weldsim.rounded import rounded
 
         written, trouble = [], ""
         pictures: tuple[bytes | None, ...] = (None,) * len(result.trials)
@@ -216,7 +217,7 @@ class DryRunCommand(ConfigOptions):
             if (png := pictures[failed]) is not None:
                 written.append(write_whole(self.png, png))
         if self.out is not None:
-            written.append(write_whole(self.out, json.dumps(dry_run_json(result), indent=1, allow_nan=False) + "\n"))
+            written.append(write_whole(self.out, json.dumps(rounded(dry_run_json(result)), indent=1, allow_nan=False) + "\n"))
         return written, trouble
 
     def _map(self, path: "TorchPath", cell: "Cell", config: "MotionConfig", tell: Any) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from weldsim.mounts import X_FT
 from weldsim.output import write_whole
 from weldsim.quantity import MetrePerSecond
 from weldsim.records import MILLIMETRE_SPAN, Seam, Segment, TorchPath
+from weldsim.rounded import rounded
 
 SCHEMA = "weldsim.path/1"
 DECIMALS = 9  # a nanometre, a nanoradian: below any sensor, above the rounding noise of another machine
@@ -81,7 +82,7 @@ def path_text(document: dict[str, Any], *, timing: bool = True) -> str:
     """The document as JSON text, one pose a line; without the run times when `timing` is false (for comparisons)."""
     kept = dict(document) if timing else {**document, "timing": {}}
     seams = kept.pop("seams")
-    head = json.dumps(kept, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    head = json.dumps(rounded(kept), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     body = ",\n".join(_seam_text(seam) for seam in seams)
     return f'{head[:-1]},\n"seams":[{body}]}}\n'
 

@@ -19,6 +19,7 @@ from weldsim.records import KnownSeam, PointCloud, RobotFacts, SeamFindings
 from weldsim.report.html import write_html
 from weldsim.report.png import png
 from weldsim.report.weld import report_json, versions
+from weldsim.rounded import FINE
 from weldsim.run_folder import MANIFEST, SCHEMA, folder_in_place, log_bytes, write_json
 from weldsim.welding.job import Job, JobConfig, judged
 
@@ -50,7 +51,7 @@ def write_job(
 
     def fill(place: Path) -> None:
         resolved = {"cell": to_json(config), "scene": None if scene is None else to_json(scene), "job": job_json(job)}
-        write_json(place / "config.json", resolved)
+        write_json(place / "config.json", resolved, FINE)
         shutil.copyfile(file, place / f"path{file.suffix.lower()}")
         write_json(place / "contract.json", contract_json(done.clauses, done.facts))
         if done.trial is not None:

@@ -77,7 +77,7 @@ def test_margins_are_told_where_a_motion_would_pass_alone(passed: DryRun, cell: 
     assert ">WOULD PASS</div>" in text
     assert "seam-1: would pass" in text
     assert "Clearance and margins" in text
-    drawn = json.loads(text[text.rindex("const FIGURES=") + 14 : text.rindex(";\nfor (const f of FIGURES)")])
+    drawn, _ = json.JSONDecoder().raw_decode(text, text.rindex("const FIGURES=") + 14)
     limits = [[shape["y0"] for shape in figure["layout"]["shapes"] if shape["type"] == "line"] for figure in drawn]
     assert limits == [pytest.approx([-360, 360]), pytest.approx([-np.rad2deg(3), np.rad2deg(3)])]
     for figure, (low, high) in zip(drawn, limits, strict=True):
