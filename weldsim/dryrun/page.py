@@ -67,7 +67,10 @@ def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[
     if png is not None:
         image = base64.b64encode(png).decode()
         title = "First failure" if failure is not None else "Halfway"
-        parts.append(f'<section><h2>{title}</h2><img style="max-width:100%" src="data:image/png;base64,{image}"></section>')
+        alt = escape(f"{trial.name}: the arm {'where it fails first' if failure is not None else 'halfway'}")
+        parts.append(
+            f'<section><h2>{title}</h2><img style="max-width:100%" alt="{alt}" src="data:image/png;base64,{image}"></section>'
+        )
     if trial.margins:
         parts.append(f"<section><h2>Clearance and margins</h2>{_margins(trial.margins)}</section>")
     parts.append(f"<section><h2>Waypoints</h2>{_waypoints(trial)}</section>")
@@ -102,7 +105,7 @@ def _waypoints(trial: Trial) -> str:
         span = first.label if first is last or first.index == last.index else f"{first.label} to {last.label}"
         s = _span(first.s, last.s)
         mark = '<td class="mark ok">ok</td>' if first.ok else f'<td class="mark no">{escape(first.why)}</td>'
-        rows.append(f'<tr><td>{escape(span)}</td><td class="num">{s}</td>{mark}<td>{escape(first.text)}</td></tr>')
+        rows.append(f'<tr><td class="num">{escape(span)}</td><td class="num">{s}</td>{mark}<td>{escape(first.text)}</td></tr>')
     more = f"<p>and {len(found) - ROWS} more</p>" if len(found) > ROWS else ""
     head = "<tr><th>waypoint</th><th>s</th><th>verdict</th><th>reason</th></tr>"
     return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>{more}"
@@ -131,11 +134,12 @@ def _plot(drawn: list[dict[str, Any]], title: str, t: ndarray, values: ndarray, 
         "xaxis": {**axis, "title": {"text": "time [s]"}},
         "yaxis": {**axis, "title": {"text": label}, "range": [-1.12 * limit, 1.12 * limit]},
     }
+    unit = label[label.index("[") + 1 : label.index("]")]
     line = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "line": {"color": BAD, "width": 1, "dash": "dot"}}
     layout["shapes"] = [{**line, "y0": edge, "y1": edge} for edge in (-limit, limit)]
     word = {"x": 1, "xref": "paper", "xanchor": "right", "showarrow": False, "font": {"size": 10, "color": BAD}}
     layout["annotations"] = [
-        {**word, "y": edge, "yanchor": anchor, "text": f"limit {edge:+.0f}"}
+        {**word, "y": edge, "yanchor": anchor, "text": f"limit {edge:+.0f} {unit}"}
         for edge, anchor in ((limit, "top"), (-limit, "bottom"))
     ]
     shade_arc(layout, trial.t, trial.arc_on)

@@ -21,7 +21,7 @@ main{max-width:1600px}
 table{font-size:13px}th{font-size:12px;vertical-align:bottom}
 td,th{padding-right:6px;overflow-wrap:normal}td.num,td.worse{white-space:nowrap}td.name{min-width:7.5em;overflow-wrap:anywhere}
 .seeds table{font-size:12px}.seeds th{font-size:11px}
-@media(max-width:1100px){.seeds table,.seeds th{font-size:10px}.seeds th{overflow-wrap:anywhere}.seeds td.name{min-width:4em}}
+@media(max-width:1100px){.seeds table,.seeds th{font-size:10px}.seeds td.name{min-width:4em}}
 td.why{color:var(--soft);padding-left:16px;border-top:0}
 """
 

@@ -9,11 +9,12 @@ from pathlib import Path
 
 from weldsim import units
 from weldsim.counted import counted
+from weldsim.kinematics import JOINT_NAMES
 from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
 from weldsim.report import figures
 from weldsim.report.limits import Check, ReportConfig, checks
-from weldsim.report.verdict import look, stopped_place, verdict
+from weldsim.report.verdict import found_by, look, stopped_place, verdict
 from weldsim.report.view import cross_section, error_lines, shows_surface
 
 STYLE = """
@@ -41,6 +42,7 @@ tr:last-child td{border-bottom:0}.num{white-space:nowrap}
 .checks th:first-child{width:42%}.checks th:last-child{width:14%}
 .mark{white-space:nowrap;font-weight:600}.mark.ok{color:var(--good)}.mark.no{color:var(--bad)}.mark.look{color:var(--amber)}
 .bar{height:10px;background:#7d9bb8;border-radius:3px;min-width:2px}
+main>p{margin:0 0 16px}
 .still img{width:100%;height:auto;display:block}
 footer{color:var(--soft);font-size:13px;overflow-wrap:anywhere}
 """
@@ -80,7 +82,7 @@ def write_html(
     known: tuple[KnownSeam, ...] = (),
     welded: int = 0,
     others: Mapping[int, ExecutionLog] | None = None,
-    joint_names: tuple[str, ...] = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3"),
+    joint_names: tuple[str, ...] = tuple(name.replace("_", " ") for name in JOINT_NAMES),
     config: ReportConfig | None = None,
     still: bytes | None = None,
 ) -> Path:
@@ -199,7 +201,7 @@ def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) ->
     listed = "" if report.passed else "".join(f"<li>{escape(reason)}</li>" for reason in report.reasons)
     on = (report.way_on,) if report.way_on else ()
     listed += "".join(f"<li>{escape(clause)}</li>" for clause in (*on, *report.warnings, *report.unplanned))
-    facts = f"{why}; method {report.method}" + ("" if report.seed is None else f", seed {report.seed}")
+    facts = f"{why}; {found_by(report)}" + ("" if report.seed is None else f", seed {report.seed}")
     return (
         f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"
         f'<div class="verdict {look(word)}">{escape(word)}</div></header>'

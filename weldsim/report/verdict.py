@@ -10,6 +10,7 @@ from weldsim.report.limits import Check, ReportConfig, checks
 Look = Literal["good", "amber", "bad", "plain"]
 """How a headline is coloured."""
 
+PATH_FILE = "path file"  # the method of findings that a file told
 PASSED, AMBER, FAILED, STOPPED, UNJUDGED = "PASSED", "PASSED WITH WARNINGS", "FAILED", "STOPPED", "NOT JUDGED"
 LOOKS: dict[str, Look] = {PASSED: "good", AMBER: "amber", FAILED: "bad", STOPPED: "bad", UNJUDGED: "amber"}
 
@@ -32,6 +33,11 @@ def verdict(report: WeldReport, found: int, config: ReportConfig) -> tuple[str, 
         others = len(report.warnings) - (0 < report.welded < report.seams)
         return AMBER, part + kept + (f", {counted(others, 'warning')}" if others else "")
     return PASSED, part + kept
+
+
+def found_by(report: WeldReport) -> str:
+    """ "method profile", or that nothing was looked for."""
+    return "seams from a path file" if report.method == PATH_FILE else f"method {report.method}"
 
 
 def look(word: str) -> Look:

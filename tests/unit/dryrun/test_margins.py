@@ -1,6 +1,7 @@
 """What a motion has to spare: figures known beforehand, shown where it would pass and nowhere else."""
 
 import json
+import re
 from dataclasses import replace
 
 import mujoco
@@ -80,6 +81,9 @@ def test_margins_are_told_where_a_motion_would_pass_alone(passed: DryRun, cell: 
     drawn, _ = json.JSONDecoder().raw_decode(text, text.rindex("const FIGURES=") + 14)
     limits = [[shape["y0"] for shape in figure["layout"]["shapes"] if shape["type"] == "line"] for figure in drawn]
     assert limits == [pytest.approx([-360, 360]), pytest.approx([-np.rad2deg(3), np.rad2deg(3)])]
+    words = [[note["text"] for note in figure["layout"]["annotations"]] for figure in drawn]
+    assert words == [["limit +360 deg", "limit -360 deg"], ["limit +172 deg/s", "limit -172 deg/s"]]
+    assert all("alt=" in picture for picture in re.findall("<img [^>]*>", text.split("<script>")[0]))
     for figure, (low, high) in zip(drawn, limits, strict=True):
         seen = figure["layout"]["yaxis"]["range"]
         assert seen[0] < low < high < seen[1]

@@ -1,6 +1,7 @@
 """The report's page: a still picture where a browser draws no 3D, and panels that are named for what they hold."""
 
 import base64
+import json
 import re
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.report.test_pictures import CLOUD, FOUND, INSIDE, KNOWN, LOG, PATH, REPORT, SEAM
+from weldsim.kinematics import JOINT_NAMES
 from weldsim.records import PointCloud, SeamFindings
 from weldsim.report import figures
 from weldsim.report.html import write_html
@@ -97,3 +99,19 @@ def test_a_browser_shows_either_the_figure_or_the_still_picture(tmp_path: Path, 
     assert ("hidden" in still) == (hidden == "still")
     assert ("hidden" in place) == (hidden == "place")
     assert 'class="js-plotly-plot"' in re.findall(r'<div id="figure-2"[^>]*>', body)[0], "other figures are drawn all the same"
+
+
+def test_seams_of_a_file_were_found_by_no_method(tmp_path: Path) -> None:
+    for method, said in (("profile", "; method profile"), ("path file", "; seams from a path file")):
+        text = write_html(tmp_path / "a.html", replace(REPORT, method=method), CLOUD, FOUND, (PATH,)).read_text()
+        assert said in text
+        assert "method path file" not in text
+
+
+def test_joints_have_the_names_that_the_dry_run_gives_them(tmp_path: Path) -> None:
+    text = write_html(tmp_path / "a.html", REPORT, CLOUD, FOUND, (PATH,), log=LOG).read_text()
+    drawn, _ = json.JSONDecoder().raw_decode(text, text.rindex("const FIGURES=") + 14)
+    (angles,) = [
+        figure for figure in drawn if figure["layout"].get("yaxis", {}).get("title", {}).get("text") == "joint angle [deg]"
+    ]
+    assert [line["name"] for line in angles["data"]] == [name.replace("_", " ") for name in JOINT_NAMES]
