@@ -25,6 +25,7 @@ WIDER = 1.6  # how much wider than high a scene is on a wide page
 NARROW = 1.3  # on a narrower one than this the eye stands back, chosen: titles of the axes are whole at 800 and at 1280 pixels
 POLE = 0.05  # [m] height of the mark where a weld was stopped, over the seam
 TICKS = 10  # on the longest side of the scene, fewer on shorter ones: they have to stand apart
+LABEL = 28  # [px] height of a label of two lines
 LINE_LIMIT = 3000  # samples drawn of one line
 
 
@@ -177,16 +178,28 @@ def errors_distance(lines: dict[str, ErrorLine], config: ReportConfig) -> Figure
         for name, line in lines.items()
     ]
     layout = _layout("along the seam [mm]", "cross-track distance [mm]")
-    layout["yaxis"]["rangemode"] = "tozero"
     limits = {"mean": config.mean, "p95": config.p95, "max": config.max}
-    layout["shapes"] = [_level(units.to_mm(value)) for value in limits.values()]
+    levels = {name: units.to_mm(value) for name, value in sorted(limits.items(), key=lambda limit: limit[1])}
+    top = 1.06 * max(*levels.values(), *(1e3 * float(line.distance.max()) for line in lines.values()))
+    layout["yaxis"]["range"] = [0.0, top]
+    layout["shapes"] = [_level(level) for level in levels.values()]
+    height = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
+    places = _spread(list(levels.values()), LABEL * top / height)
     layout["annotations"] = [
-        {"x": 1.01, "xref": "paper", "xanchor": "left", "y": units.to_mm(value), "yanchor": "middle", "showarrow": False}
+        {"x": 1.01, "xref": "paper", "xanchor": "left", "y": place, "yanchor": "middle", "showarrow": False}
         | {"text": f"limit of<br>{name}", "align": "left", "font": {"size": 10, "color": SOFT}}
-        for name, value in limits.items()
+        for name, place in zip(levels, places, strict=True)
     ]
     layout["margin"]["r"] = 56  # beside the plot: in it a line would run through the words
     return {"data": data, "layout": layout}
+
+
+def _spread(places: list[float], apart: float) -> list[float]:
+    """The places of labels, in order, each moved up until it stands `apart` from the one below."""
+    out: list[float] = []
+    for place in places:
+        out.append(place if not out else max(place, out[-1] + apart))
+    return out
 
 
 def torch_speed(log: ExecutionLog, path: TorchPath, config: ReportConfig, stopped: float | None = None) -> Figure | None:

@@ -14,7 +14,7 @@ from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
 from weldsim.report import figures
 from weldsim.report.limits import Check, ReportConfig, checks
-from weldsim.report.verdict import found_by, look, stopped_place, verdict
+from weldsim.report.verdict import PATH_FILE, found_by, look, stopped_place, verdict
 from weldsim.report.view import cross_section, error_lines, shows_surface
 
 STYLE = """
@@ -111,7 +111,9 @@ def write_html(
         plots = _plots(drawn, cloud, findings, paths, each, known, index, joint_names, config, here)
         title = f"<h2>Seam {index + 1}</h2>" if len(findings.seams) > 1 else ""
         body.append(f'{title}<div class="two">{"".join(plots)}</div>' if plots else "")
-    body.append(f'<div class="two">{_seams(findings)}{_refused(findings)}{_threshold(findings.threshold)}{_timing(report)}</div>')
+    body.append(
+        f'<div class="two">{_seams(findings)}{_refused(report, findings)}{_threshold(findings.threshold)}{_timing(report)}</div>'
+    )
     body.append(_footer(report))
     return write_whole(path, _page(report.scene, "".join(body), drawn))
 
@@ -212,7 +214,8 @@ def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) ->
 def _cards(report: WeldReport, findings: SeamFindings, welded: int) -> str:
     """The handful of numbers that are read first; of several seams, those of the first that was welded."""
     count = len(findings.seams)
-    cards: list[tuple[str, str]] = [(str(count), "seam found" if count == 1 else "seams found")]
+    told = "in the path file" if report.method == PATH_FILE else "found"
+    cards: list[tuple[str, str]] = [(str(count), f"{'seam' if count == 1 else 'seams'} {told}")]
     if findings.seams:
         index = welded if welded < count else 0
         seam = findings.seams[index]
@@ -275,7 +278,9 @@ def _seams(findings: SeamFindings) -> str:
     )
 
 
-def _refused(findings: SeamFindings) -> str:
+def _refused(report: WeldReport, findings: SeamFindings) -> str:
+    if report.method == PATH_FILE:  # nothing was looked for
+        return ""
     rows = []
     for r in findings.rejected:
         where = ", ".join(f"{units.to_mm(v):.0f}" for v in r.position_B)

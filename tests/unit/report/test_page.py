@@ -8,6 +8,7 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.unit.report.test_pictures import CLOUD, FOUND, INSIDE, KNOWN, LOG, PATH, REPORT, SEAM
@@ -15,7 +16,9 @@ from weldsim.kinematics import JOINT_NAMES
 from weldsim.records import PointCloud, SeamFindings
 from weldsim.report import figures
 from weldsim.report.html import write_html
+from weldsim.report.limits import ReportConfig
 from weldsim.report.png import png
+from weldsim.report.view import ErrorLine
 
 STILL = png(REPORT, CLOUD, FOUND, (PATH,), log=LOG, known=(KNOWN,))
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -106,6 +109,9 @@ def test_seams_of_a_file_were_found_by_no_method(tmp_path: Path) -> None:
         text = write_html(tmp_path / "a.html", replace(REPORT, method=method), CLOUD, FOUND, (PATH,)).read_text()
         assert said in text
         assert "method path file" not in text
+    assert "seam in the path file" in text
+    assert "seam found" not in text
+    assert "Candidates refused" not in headings(text), "nothing was looked for"
 
 
 def test_joints_have_the_names_that_the_dry_run_gives_them(tmp_path: Path) -> None:
@@ -115,3 +121,23 @@ def test_joints_have_the_names_that_the_dry_run_gives_them(tmp_path: Path) -> No
         figure for figure in drawn if figure["layout"].get("yaxis", {}).get("title", {}).get("text") == "joint angle [deg]"
     ]
     assert [line["name"] for line in angles["data"]] == [name.replace("_", " ") for name in JOINT_NAMES]
+
+
+@pytest.mark.parametrize("worst", [0.1e-3, 3e-3, 30e-3])
+def test_the_limits_of_the_distance_are_in_view_and_their_labels_apart(worst: float) -> None:
+    """Beside a line that is far off, the limits lie close together."""
+    s = np.linspace(0.0, 0.2, 50)
+    line = ErrorLine(s=s, across=0 * s, distance=worst * s / s[-1])
+    config = ReportConfig()
+    layout = figures.errors_distance({"plan": line}, config)["layout"]
+    low, high = layout["yaxis"]["range"]
+    assert low == 0
+    assert high > 1e3 * max(worst, config.max)
+    levels = [shape["y0"] for shape in layout["shapes"]]
+    assert levels == pytest.approx([0.4, 0.8, 1.2])
+    assert [label["text"] for label in layout["annotations"]] == ["limit of<br>mean", "limit of<br>p95", "limit of<br>max"]
+    pixels = np.array([label["y"] for label in layout["annotations"]]) * 220 / high  # of the plot's 220
+    assert np.diff(pixels).min() >= 2 * 10 * 1.2, "two lines of 10 px"
+    assert pixels.max() <= 220
+    if worst < 1e-3:
+        assert [label["y"] for label in layout["annotations"]] == levels
