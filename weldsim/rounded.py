@@ -3,7 +3,7 @@
 from typing import Any
 
 DECIMALS = 9  # a nanometre, a nanoradian, a nanosecond
-FINE = 12  # of quaternions, whose length is to be 1, and of settings, which are to be what was set
+FINE = 12  # of quaternions, whose length is to be 1, and of settings that are shown
 SMALL = 1e-3  # below it as many digits as a value has there
 FINER = ("quaternion_wxyz",)
 EXACT = ("dh",)  # an arm's own figures are compared with a nominal arm's to the last digit

@@ -152,7 +152,7 @@ def test_what_the_twin_scans_can_be_planned(tmp_path, monkeypatch, capsys):
     assert said["written"] == ["scan.ply", "depth.png", "depth.intrinsics.json", "depth.pose.json"]
     cloud = read_cloud("scan.ply")
     assert said["points"] == len(cloud)
-    np.testing.assert_allclose(cloud.viewpoints, said["viewpoints"])
+    np.testing.assert_allclose(cloud.viewpoints, said["viewpoints"], atol=1e-9)
     assert main(["plan", "scan.ply", "--json"]) == 0
     first = json.loads(capsys.readouterr().out)
     assert main(["plan", "depth.png", "--intrinsics", "depth.intrinsics.json", "--pose", "depth.pose.json", "--json"]) == 0

@@ -19,7 +19,6 @@ from weldsim.pipeline import Clock, Finder, PlanResult, RunResult, SensorName, S
 from weldsim.records import Rejection, SeamFindings
 from weldsim.regression.figures import Figures, figures_of
 from weldsim.regression.golden import Deviation, Entries, compare
-from weldsim.rounded import FINE
 from weldsim.run_folder import MANIFEST, SCHEMA, check_run_folder, write_json, write_run
 
 if TYPE_CHECKING:
@@ -176,7 +175,7 @@ def _unseen(task: Task, method: str, error: WeldsimError) -> Row:
         check_run_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
         resolved = {"cell": to_json(task.methods[method]), "scene": to_json(task.scene), "seed": task.seed}
-        write_json(folder / "config.json", resolved, FINE)
+        write_json(folder / "config.json", resolved, exact=True)
         said = {"schema": SCHEMA, "scene": task.scene.name, "seed": task.seed, "method": method, "refused": str(error)}
         write_json(folder / MANIFEST, said)
     judged = any(entry.judges(task.seed) for entry in entries.values())

@@ -19,7 +19,6 @@ from weldsim.records import KnownSeam, PointCloud, RobotFacts, SeamFindings
 from weldsim.report.html import write_html
 from weldsim.report.png import png
 from weldsim.report.weld import report_json, versions
-from weldsim.rounded import FINE
 from weldsim.run_folder import MANIFEST, SCHEMA, folder_in_place, log_bytes, write_json
 from weldsim.welding.job import Job, JobConfig, judged
 
@@ -51,7 +50,7 @@ def write_job(
 
     def fill(place: Path) -> None:
         resolved = {"cell": to_json(config), "scene": None if scene is None else to_json(scene), "job": job_json(job)}
-        write_json(place / "config.json", resolved, FINE)
+        write_json(place / "config.json", resolved, exact=True)
         shutil.copyfile(file, place / f"path{file.suffix.lower()}")
         write_json(place / "contract.json", contract_json(done.clauses, done.facts))
         if done.trial is not None:
