@@ -13,6 +13,7 @@ from weldsim.cloud.deproject import deproject
 from weldsim.cloud.extent import check_extent_of_array
 from weldsim.cloud.files import read_cloud
 from weldsim.config import CellConfig, load_config, load_scene
+from weldsim.counted import counted
 from weldsim.errors import CloudError, InputError, WeldsimError
 from weldsim.records import DepthFrame, PointCloud, Seam, SeamFindings
 from weldsim.schema import structure
@@ -78,7 +79,7 @@ def _points(given: Any) -> Float[ndarray, "n 3"]:
         raise InputError(f"plan: an array of shape {points.shape} is no cloud: {wanted}{depth}", shape=points.shape)
     finite = np.isfinite(points).all(axis=1)
     if not finite.any():
-        raise CloudError(f"none of the {len(points)} points is finite", total=len(points))
+        raise CloudError(f"none of the {counted(len(points), 'point')} is finite", total=len(points))
     points = points if finite.all() else points[finite]
     check_extent_of_array("plan", points)
     return points
@@ -155,7 +156,8 @@ def findings_from(given: Any, cloud: PointCloud, finder: str) -> SeamFindings:
     """
     if isinstance(given, SeamFindings):
         if len(given.region) != len(cloud):
-            raise InputError(f"finder {finder}: region has {len(given.region)} entries, the cloud {len(cloud)} points: one each")
+            region, points = counted(len(given.region), "entry"), counted(len(cloud), "point")
+            raise InputError(f"finder {finder}: region has {region}, the cloud {points}: one each")
         return given
     if given is None:
         seams: tuple[Seam, ...] = ()

@@ -22,8 +22,9 @@ from weldsim.path.files import path_document, write_path_csv, write_path_json
 from weldsim.pipeline import RunResult
 from weldsim.records import ExecutionLog
 from weldsim.report.html import write_html
-from weldsim.report.png import write_png
+from weldsim.report.png import png
 from weldsim.report.weld import report_json
+from weldsim.rounded import rounded
 from weldsim.sensor.choose import SensorName, depth_step
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def folder_in_place(folder: Path, fill: Callable[[Path], None], *, keep_earlier:
 def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConfig", seed: int, sensor: SensorName) -> None:
     plan, report = result.plan, result.report
     resolved = {"cell": to_json(for_scene(config, scene)), "scene": to_json(scene), "seed": seed, "sensor": sensor}
-    write_json(folder / "config.json", resolved)
+    write_json(folder / "config.json", resolved, exact=True)  # it is read back
     source = {"scene": scene.name, "seed": seed, "sensor": sensor, "points": len(plan.cloud), "method": plan.findings.method}
     reasons = {index: str(error) for index, error in plan.refused.items()}
     document = path_document(plan.findings.seams, plan.paths, report.timing, source, plan.config_digest, refused=reasons)
@@ -114,8 +115,9 @@ def _fill(folder: Path, result: RunResult, config: CellConfig, scene: "SceneConf
     write_json(folder / "report.json", report_json(report, limits))
     seen = {"log": result.log, "known": result.world.known_seams, "welded": result.welded, "config": limits}
     others = {weld.seam: weld.log for weld in result.others}
-    write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, others=others, **seen)
-    write_png(folder / "report.png", report, plan.cloud, plan.findings, plan.paths, **seen)
+    picture = png(report, plan.cloud, plan.findings, plan.paths, **seen)
+    write_html(folder / "report.html", report, plan.cloud, plan.findings, plan.paths, others=others, still=picture, **seen)
+    write_whole(folder / "report.png", picture)
     if result.log is not None:
         write_whole(folder / "log.npz", log_bytes({result.welded: result.log, **others}))
     manifest = {
@@ -204,6 +206,6 @@ def _is_run(folder: Path) -> bool:
         return False
 
 
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Nothing; the file is written whole, readable, without numbers that JSON has not."""
-    write_whole(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+def write_json(path: Path, content: dict[str, Any], *, exact: bool = False) -> None:
+    """Nothing; the file is written whole, readable, floats rounded unless `exact`, without numbers that JSON has not."""
+    write_whole(path, json.dumps(content if exact else rounded(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")

@@ -24,6 +24,7 @@ from cattrs.errors import ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn, make_dict_unstructure_fn, override
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.errors import ConfigError, WeldsimError
 
 Config = TypeVar("Config")
@@ -223,7 +224,10 @@ def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
     if len(types) == 2 and types[1] is Ellipsis:
         types = (types[0],) * len(value)
     if len(types) != len(value):
-        raise ConfigError(f"holds {len(value)} values, {len(types)} are needed: {_type_name(hint)}", value=value)
+        raise ConfigError(
+            f"holds {counted(len(value), 'value')}, {len(types)} {'is' if len(types) == 1 else 'are'} needed: {_type_name(hint)}",
+            value=value,
+        )
     result, errors = [], []
     for index, (item, kind) in enumerate(zip(value, types, strict=True)):
         try:

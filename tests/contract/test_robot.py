@@ -70,6 +70,7 @@ def test_facts_are_those_of_our_arm_and_mount(robot: Robot) -> None:
     with robot:
         facts = robot.facts()
         assert (facts.model, facts.safety, facts.mode) == ("UR5", "normal", "running")
+        assert facts.serial != "0", "no arm has this number: where there is none, nothing is told"
         assert not facts.program_running
         assert facts.remote_control is not False
         assert facts.X_FT is not None

@@ -152,7 +152,7 @@ def test_what_the_twin_scans_can_be_planned(tmp_path, monkeypatch, capsys):
     assert said["written"] == ["scan.ply", "depth.png", "depth.intrinsics.json", "depth.pose.json"]
     cloud = read_cloud("scan.ply")
     assert said["points"] == len(cloud)
-    np.testing.assert_allclose(cloud.viewpoints, said["viewpoints"])
+    np.testing.assert_allclose(cloud.viewpoints, said["viewpoints"], atol=1e-9)
     assert main(["plan", "scan.ply", "--json"]) == 0
     first = json.loads(capsys.readouterr().out)
     assert main(["plan", "depth.png", "--intrinsics", "depth.intrinsics.json", "--pose", "depth.pose.json", "--json"]) == 0
@@ -223,7 +223,7 @@ def test_a_run_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch, 
     def fail(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("weldsim.run_folder.write_png", fail)
+    monkeypatch.setattr("weldsim.run_folder.png", fail)
     assert main(["run", "plain", "--out", "old"]) == 2
     assert "No space left" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["old"]

@@ -60,6 +60,7 @@ def test_no_table_is_wider_than_the_screen() -> None:
                 widths += [0] * (i + 1 - len(widths))
                 widths[i] = max(widths[i], *map(len, words))
         assert sum(widths) * LETTER + len(widths) * GAP < SCREEN
+    assert not re.search(r"th\{[^}]*anywhere", text), "headings break between words, never within one"
 
 
 def test_reasons_stand_under_their_figures_and_units_over_them() -> None:

@@ -260,8 +260,8 @@ def test_normals_of_a_seam_stand_across_it():
 @pytest.mark.parametrize(
     ("points", "normals", "says"),
     [
-        ([[0, 0, 0]], (0, 0, 1), "1 places; a seam needs two"),
-        ([[0, 0, 0], [0, 0, 0]], (0, 0, 1), "1 places"),
+        ([[0, 0, 0]], (0, 0, 1), "1 place; a seam needs two"),
+        ([[0, 0, 0], [0, 0, 0]], (0, 0, 1), "1 place"),
         ([[0, 0, 0], [0, 0, 0.1]], (0, 0, 1), "along travel in places"),
         ([[0, 0], [1, 1]], (0, 0, 1), "shape (2, 2)"),
         ([[0, 0, np.nan], [0, 1, 0]], (0, 0, 1), "finite"),

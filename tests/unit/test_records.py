@@ -114,9 +114,9 @@ SHORT, LONG = LINE[:-1], 10.0 * LINE / LINE[-1, 0]
 
 WRONG: list[tuple[type, str, Any, str]] = [
     *((Seam, name, SHORT, r"shape \(3, 3\), expected \(4, 3\)") for name in ("tangents_B", "normals_B", "left_B", "right_B")),
-    *((Seam, name, NAN, "1 values are not finite") for name in ("points_B", "tangents_B", "normals_B", "left_B", "right_B")),
+    *((Seam, name, NAN, "1 value is not finite") for name in ("points_B", "tangents_B", "normals_B", "left_B", "right_B")),
     *((Seam, name, 1.01 * X, "not unit") for name in ("tangents_B", "normals_B")),
-    (Seam, "points_B", LINE[:1], "1 points; a seam needs two"),
+    (Seam, "points_B", LINE[:1], "1 point; a seam needs two"),
     (Seam, "points_B", LINE[:, :2], r"shape \(4, 2\), expected \(n, 3\)"),
     (Seam, "points_B", LONG, r"spans 10 m \(limit 5 m\): looks like millimetres"),
     (Seam, "s", S[:-1], "shape"),
@@ -138,7 +138,7 @@ WRONG: list[tuple[type, str, Any, str]] = [
     (KnownSeam, "s", S[[0, 1, 1, 3]], "not strictly increasing"),
     (TorchPath, "X_BT", Transform("BF", POSES.R, POSES.p), "X_BT"),
     (TorchPath, "X_BT", POSES[0], "batch"),
-    (TorchPath, "X_BT", POSES[:1], "1 poses; a path needs two"),
+    (TorchPath, "X_BT", POSES[:1], "1 pose; a path needs two"),
     (TorchPath, "X_BT", Transform("BT", POSES.R, LONG), "millimetres"),
     (TorchPath, "s", -S, "decreases"),
     (TorchPath, "s", S[:-1], "shape"),

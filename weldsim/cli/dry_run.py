@@ -11,6 +11,7 @@ from weldsim.cli.options import ConfigOptions, choose_platform, keep_importable,
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.quantities import JOINTS, LEANED, MOVED, TURNED, WELD_SPEED, quantities, quantity
 from weldsim.cli.show import print_json, progress, table
+from weldsim.counted import counted
 from weldsim.dryrun.names import Base, Tool
 from weldsim.errors import InputError, SensorError
 
@@ -202,6 +203,7 @@ class DryRunCommand(ConfigOptions):
 
         from weldsim.dryrun.verdict import dry_run_json
         from weldsim.output import write_whole
+        from weldsim.rounded import rounded
 
         written, trouble = [], ""
         pictures: tuple[bytes | None, ...] = (None,) * len(result.trials)
@@ -219,7 +221,7 @@ class DryRunCommand(ConfigOptions):
             if (png := pictures[failed]) is not None:
                 written.append(write_whole(self.png, png))
         if self.out is not None:
-            written.append(write_whole(self.out, json.dumps(dry_run_json(result), indent=1, allow_nan=False) + "\n"))
+            written.append(write_whole(self.out, json.dumps(rounded(dry_run_json(result)), indent=1, allow_nan=False) + "\n"))
         return written, trouble
 
     def _map(self, path: "TorchPath", cell: "Cell", config: "MotionConfig", tell: Any) -> dict[str, Any]:
@@ -264,7 +266,7 @@ class DryRunCommand(ConfigOptions):
         for trial, fixes in zip(result.trials, result.fixes, strict=True):
             state = f"{trial.cycle:.1f} s" if trial.passed else "fails"
             what = "motion" if trial.verdicts[0].line else "waypoint"
-            print(f"  {trial.name}: {len(trial.verdicts)} {what}s, {units.to_mm(trial.length):.0f} mm, {state}")
+            print(f"  {trial.name}: {counted(len(trial.verdicts), what)}, {units.to_mm(trial.length):.0f} mm, {state}")
             if rows := failures(trial):
                 print(table(rows, (what, "s", "verdict", "reason")))
             if trial.margins:

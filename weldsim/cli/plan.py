@@ -11,6 +11,7 @@ from weldsim.cli.options import ConfigOptions, Method, refuse_together
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
 from weldsim.cli.quantities import COUNT, POINT, quantities, quantity
 from weldsim.cli.show import Tell, progress, reasons_refused, table, times
+from weldsim.counted import counted
 from weldsim.errors import CloudError, InputError, NoSeamError, PathError
 
 if TYPE_CHECKING:
@@ -221,8 +222,10 @@ class Plan(ConfigOptions):
     def _write_report(
         self, page: Path | None, picture: Path | None, chosen: "PlanResult", clock: "Clock", config: "CellConfig"
     ) -> None:
+        from weldsim.output import write_whole
         from weldsim.pipeline import unplanned
         from weldsim.report.html import write_html
+        from weldsim.report.png import png
         from weldsim.report.weld import weld_report
 
         report = weld_report(
@@ -234,13 +237,12 @@ class Plan(ConfigOptions):
             config_digest=chosen.config_digest,
             config=config.report,
         )
+        still = png(report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
         if page is not None:
             page.parent.mkdir(parents=True, exist_ok=True)
-            write_html(page, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+            write_html(page, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report, still=still)
         if picture is not None:
-            from weldsim.report.png import write_png  # matplotlib takes most of a second
-
-            write_png(picture, report, chosen.cloud, chosen.findings, chosen.paths, config=config.report)
+            write_whole(picture, still)
 
     def _print_json(self, document: dict[str, Any], result: "PlanResult") -> None:
         import numpy as np
@@ -262,7 +264,7 @@ class Plan(ConfigOptions):
         from weldsim.pipeline import unplanned
 
         found, method = len(result.findings.seams), chosen.findings.method
-        print(f"{self.cloud.name}: {len(result.cloud)} points, {found} seam{'' if found == 1 else 's'}, method {method}")
+        print(f"{self.cloud.name}: {counted(len(result.cloud), 'point')}, {counted(found, 'seam')}, method {method}")
         rows = []
         for number, seam, path in zip(numbers, chosen.findings.seams, chosen.paths, strict=True):
             sigma = "-" if seam.sigma is None else f"{units.to_mm(float(np.median(seam.sigma))):.3f} mm"

@@ -10,6 +10,7 @@ import tyro
 from weldsim.cli.options import SCENE_PREFIX, ConfigOptions, choose_platform, parted
 from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder
 from weldsim.cli.show import print_json, progress, table
+from weldsim.counted import counted
 from weldsim.errors import InputError
 from weldsim.sensor.names import SensorName
 from weldsim.settings import key_of
@@ -201,7 +202,7 @@ class Regress(ConfigOptions):
         }
 
     def _print(self, outcome: "Regression", path: Path, written: list[Path]) -> None:
-        from weldsim.regression.text import HEAD, counted, refusals, rows_of_text, sentence, shift_sentence, unjudged
+        from weldsim.regression.text import HEAD, refusals, rows_of_text, sentence, shift_sentence, unjudged
 
         print(table(rows_of_text(outcome), HEAD))
         where = f"{counted(len(outcome.rows), 'plan')} in {outcome.seconds:.1f} s with {counted(outcome.jobs, 'process')}"
@@ -223,7 +224,7 @@ class Regress(ConfigOptions):
             print(f"  nothing is judged: {path} holds figures of {GOLDEN_SENSOR}, not of {self.sensor}")
         elif not self.update:
             count = len(outcome.deviations) + len(outcome.shifts)
-            worse = "nothing is" if not count else f"{count} figure{' is' if count == 1 else 's are'}"
+            worse = "nothing is" if not count else f"{counted(count, 'figure')} {'is' if count == 1 else 'are'}"
             print(f"  {worse} worse than {path} allows")
         for place in written:
             print(f"  wrote {place}")

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 from weldsim.cli.options import ConfigOptions, SceneName, choose_platform
 from weldsim.cli.outputs import check_outputs, check_suffix
 from weldsim.cli.show import print_json, progress
+from weldsim.counted import counted
 from weldsim.errors import InputError
 from weldsim.sensor.names import SensorName
 
@@ -76,7 +77,8 @@ class Scan(ConfigOptions):
             lined_up = None if found is None else asdict(found)
             print_json({**what, "viewpoints": cloud.viewpoints.tolist(), "lined_up": lined_up, "written": written})
             return 0
-        print(f"{scene.name}, seed {self.seed}, {captures[0].frame.source}: {len(cloud)} points from {len(captures)} view(s)")
+        seen_in = f"{counted(len(cloud), 'point')} from {counted(len(captures), 'view')}"
+        print(f"{scene.name}, seed {self.seed}, {captures[0].frame.source}: {seen_in}")
         for i, (x, y, z) in enumerate(cloud.viewpoints, start=1):
             print(f"  view {i} from ({x:.4f}, {y:.4f}, {z:.4f}) m in the base")
         for line in (*seen.world.workpiece.notes, *seen.world.notes, *lines(found)):

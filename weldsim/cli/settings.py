@@ -10,6 +10,7 @@ import tyro
 from weldsim import units
 from weldsim.cli.options import ConfigOptions
 from weldsim.cli.show import print_json, table
+from weldsim.rounded import FINE
 
 if TYPE_CHECKING:
     from weldsim.settings import Given
@@ -41,7 +42,7 @@ class Config(ConfigOptions):
         rows = [*_rows(config, config.given), *([] if scene is None else _rows(scene, scene.given, "scene."))]
         rows = [row for row in rows if not self.given or row["source"] != "default"]
         if self.json:
-            print_json({"scene": None if scene is None else scene.name, "settings": rows})
+            print_json({"scene": None if scene is None else scene.name, "settings": rows}, decimals=FINE)
         elif rows:
             print(table([_row_of_text(row) for row in rows], ("setting", "value", "unit", "source")))
         else:

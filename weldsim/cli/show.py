@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from weldsim import units
+from weldsim.rounded import DECIMALS, rounded
 
 if TYPE_CHECKING:
     from weldsim.records import SeamFindings
@@ -51,9 +52,9 @@ def times(seconds: dict[str, float]) -> str:
     return f"  seconds: {stages}; {sum(seconds.values()):.2f} in all"
 
 
-def print_json(content: dict[str, Any]) -> None:
-    """One object on stdout."""
-    print(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
+def print_json(content: dict[str, Any], decimals: int = DECIMALS) -> None:
+    """One object on stdout, floats rounded."""
+    print(json.dumps(rounded(content, decimals), indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def print_written(written: Sequence[Path], kept: Path | None = None) -> None:

@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from weldsim.cloud.raw import RawCloud
+from weldsim.counted import counted
 from weldsim.errors import CloudError
 from weldsim.records import MILLIMETRE_SPAN, PointCloud
 
@@ -45,7 +46,7 @@ def check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: i
         points: (n, 3) [m], read in `unit`.  dropped: points that were not finite, or zero.  raw: what the file said of itself.
     """
     span = float(np.ptp(points, axis=0).max())
-    left_out = f" ({dropped} points that are not finite, or zero, left out)" if dropped else ""
+    left_out = f" ({counted(dropped, 'point')}, not finite or zero, left out)" if dropped else ""
     if span > MILLIMETRE_SPAN:
         advice = _too_wide(points, unit, span, raw)
         raise CloudError(

@@ -25,6 +25,7 @@ from weldsim.cloud.sensor_frame import placed
 from weldsim.cloud.sources import read_bytes
 from weldsim.cloud.table import read_text
 from weldsim.columns import decode, utf_16
+from weldsim.counted import counted
 from weldsim.errors import CloudError, CloudFileError, InputError, OutputError
 from weldsim.output import write_whole
 from weldsim.records import PointCloud
@@ -79,13 +80,15 @@ def read_cloud(
     keep = _seen(raw.points)
     total, dropped = len(keep), int((~keep).sum())
     if dropped == total:
-        raise CloudError(f"{path}: none of its {total} points is finite", path=str(path), total=total)
+        raise CloudError(f"{path}: none of its {counted(total, 'point')} is finite", path=str(path), total=total)
     with np.errstate(over="ignore", invalid="ignore"):
         check_grain(str(path), raw.points[keep] if dropped else raw.points, scale)
         if crop is not None:
             keep &= cropped_to(crop, raw.points * scale)
             if not keep.any():
-                raise CloudError(f"crop box: none of the {total} points of {path} is in it; change cloud.crop_min and crop_max")
+                raise CloudError(
+                    f"crop box: none of the {counted(total, 'point')} of {path} is in it; change cloud.crop_min and crop_max"
+                )
         whole = bool(keep.all())
         points = (raw.points if whole else raw.points[keep]) * scale
         check_extent(str(path), points, said, dropped, raw)
@@ -194,7 +197,9 @@ def check_plannable(cloud: PointCloud) -> None:
             the figure.
     """
     if len(cloud) < MIN_POINTS:
-        raise CloudError(f"the cloud has {len(cloud)} points, planning needs {MIN_POINTS}", points=len(cloud), limit=MIN_POINTS)
+        raise CloudError(
+            f"the cloud has {counted(len(cloud), 'point')}, planning needs {MIN_POINTS}", points=len(cloud), limit=MIN_POINTS
+        )
     columns = cloud.points.T  # by column: reducing along axis 0 is slow
     span = max(float(column.max() - column.min()) for column in columns)
     if span < MIN_SPAN:

@@ -8,6 +8,7 @@ from numpy import ndarray
 from scipy.spatial import KDTree
 
 from weldsim.cloud.config import CloudConfig
+from weldsim.counted import counted
 from weldsim.errors import CloudError
 from weldsim.records import PointCloud
 
@@ -29,7 +30,7 @@ def prepare(cloud: PointCloud, config: CloudConfig) -> PointCloud:
     for name, step in steps:
         before, cloud = len(cloud), step(cloud)
         if len(cloud) == 0:
-            raise CloudError(f"{name}: none of {before} points is left; change it in [cloud]", step=name, points=before)
+            raise CloudError(f"{name}: none of {counted(before, 'point')} is left; change it in [cloud]", step=name, points=before)
     return cloud
 
 
@@ -108,7 +109,7 @@ def estimate_normals(cloud: PointCloud, neighbours: int = 24) -> PointCloud:
     """
     n = len(cloud)
     if n < 3:
-        raise CloudError(f"{n} points have no normals; three are needed", points=n)
+        raise CloudError(f"{counted(n, 'point')} {'has' if n == 1 else 'have'} no normals; three are needed", points=n)
     tree = KDTree(cloud.points)
     normals = np.empty((n, 3))
     for start in range(0, n, 50_000):  # in pieces: the neighbours of 300,000 points at once are 170 MB

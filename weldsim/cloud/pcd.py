@@ -12,6 +12,7 @@ from numpy import ndarray
 from weldsim.cloud.raw import RawCloud, Unreadable, check_count, from_columns
 from weldsim.cloud.sensor_frame import rotation_of_quaternion
 from weldsim.cloud.table import parse_table
+from weldsim.counted import counted
 
 _MAX_HEADER = 65_536
 _MAX_RATIO = 264 // 3 + 1  # an LZF token of 3 bytes stands for at most 264
@@ -29,7 +30,7 @@ def read_pcd(data: bytes) -> RawCloud:
         case ["binary"]:
             if count * row.itemsize > len(data) - start:
                 held = (len(data) - start) // row.itemsize
-                raise Unreadable(f"its header promises {count} points, the file holds {held}: cut off?")
+                raise Unreadable(f"its header promises {counted(count, 'point')}, the file holds {held}: cut off?")
             table = np.frombuffer(data, row, count, start)
             fields = {name: table[name] for name in row.names or ()}
         case ["binary_compressed"]:
@@ -108,7 +109,7 @@ def _pose(header: dict[str, list[str]]) -> tuple[Float[ndarray, "1 3"] | None, F
 def _ascii(text: bytes, row: np.dtype, count: int) -> dict[str, ndarray]:
     widths = [int(np.prod(row[name].shape)) for name in row.names or ()]
     if 2 * count * sum(widths) > len(text) + 1:
-        raise Unreadable(f"its header promises {count} points, more than {len(text)} bytes of text can hold: cut off?")
+        raise Unreadable(f"its header promises {counted(count, 'point')}, more than {len(text)} bytes of text can hold: cut off?")
     table = parse_table(text, columns=sum(widths), rows=count)
     starts = np.cumsum([0, *widths])
     fields = {}
@@ -127,7 +128,8 @@ def _compressed(data: bytes, start: int, row: np.dtype, count: int) -> dict[str,
         raise Unreadable("it ends before its compressed data")
     packed, unpacked = struct.unpack_from("<II", data, start)
     if unpacked != count * row.itemsize:
-        raise Unreadable(f"its compressed data claims {unpacked} bytes, {count} points are {count * row.itemsize}")
+        needed = f"{counted(count, 'point')} of {row.itemsize} bytes"
+        raise Unreadable(f"its compressed data claims {unpacked} bytes, its header {needed}")
     if packed > len(data) - start - 8 or unpacked > packed * _MAX_RATIO:
         raise Unreadable(f"its compressed data claims {packed} bytes, {len(data) - start - 8} follow: cut off?")
     body = decompress_lzf(data[start + 8 : start + 8 + packed], unpacked)

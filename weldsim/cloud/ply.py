@@ -14,6 +14,7 @@ from weldsim.cloud.raw import RawCloud, Unreadable, check_count, from_columns
 from weldsim.cloud.sensor_frame import rotation_of_matrix
 from weldsim.cloud.table import TAKEN, parse_table
 from weldsim.columns import UNITS, unit_of_comments
+from weldsim.counted import counted
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -160,7 +161,7 @@ def _binary_columns(data: bytes, start: int, before: list[_Element], vertex: _El
     row = _row(data, start, vertex, order)
     if start + vertex.count * row.itemsize > len(data):
         held = max(0, len(data) - start) // max(1, row.itemsize)
-        raise Unreadable(f"its header promises {vertex.count} points, the file holds {held}: cut off?")
+        raise Unreadable(f"its header promises {counted(vertex.count, 'point')}, the file holds {held}: cut off?")
     table = np.frombuffer(data, row, vertex.count, start)
     for name in row.names or ():
         if name.startswith(_COUNT) and (table[name] != table[name][0]).any():

@@ -19,6 +19,7 @@ from weldsim.cloud.key_values import read_table
 from weldsim.cloud.raw import Unreadable
 from weldsim.cloud.sources import read_bytes
 from weldsim.columns import UNITS, decode, is_number
+from weldsim.counted import counted
 from weldsim.errors import CloudFileError, WeldsimError
 from weldsim.frames import Transform, matrix_from_quaternion, matrix_from_rotation_vector
 
@@ -61,7 +62,7 @@ def _bare_numbers(text: str) -> Transform | None:
     if not words or not all(map(is_number, words)):
         return None
     if len(words) not in (12, 16):
-        raise Unreadable(f"it holds {len(words)} numbers, which is no 4x4 matrix; with names: {WANTED}")
+        raise Unreadable(f"it holds {counted(len(words), 'number')}, which is no 4x4 matrix; with names: {WANTED}")
     return _rigid(np.array(words, float), "its matrix", 1.0)
 
 

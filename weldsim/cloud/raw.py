@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.counted import counted
+
 MAX_POINTS = 50_000_000  # more is refused before anything is allocated: 1.2 GB of coordinates alone
 
 
@@ -44,7 +46,7 @@ class RawCloud:
 def check_count(count: int) -> None:
     """Raises Unreadable for a number of points that nobody means."""
     if count <= 0:
-        raise Unreadable(f"it declares {count} points")
+        raise Unreadable(f"it declares {counted(count, 'point')}")
     if count > MAX_POINTS:
         raise Unreadable(f"it declares {count} points (limit {MAX_POINTS}); crop or thin it first")
 

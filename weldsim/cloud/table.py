@@ -24,6 +24,7 @@ from weldsim.columns import (
     plain_numbers,
     unit_of_comments,
 )
+from weldsim.counted import counted
 
 _DOUBLE = re.compile(rb"(?<=[0-9.])[dD](?=[-+][0-9])")  # exponent of a Fortran double
 _HEAD = 1 << 20  # bytes in which the first row is looked for
@@ -65,7 +66,7 @@ def parse_table(
     except (ValueError, UserWarning, OverflowError) as error:
         raise Unreadable(f"its numbers cannot be read: {str(error).rstrip('.')[:120]}") from None
     if rows is not None and len(table) < rows:
-        raise Unreadable(f"its header promises {rows} points, the file holds {len(table)}: cut off?")
+        raise Unreadable(f"its header promises {counted(rows, 'point')}, the file holds {len(table)}: cut off?")
     return table
 
 

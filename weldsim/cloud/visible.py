@@ -46,7 +46,10 @@ def sides(cloud: PointCloud) -> tuple[Side, ...]:
         if not _has_two(*_seen_from(sample, cloud.viewpoints[0])):
             return (Side(cloud),)
         kept = _front(*_seen_from(cloud.points, cloud.viewpoints[0]))
-        note = f"{int((~kept).sum())} of {len(cloud)} points lie behind others as seen from the viewpoint: left out"
+        behind = int((~kept).sum())
+        note = (
+            f"{behind} of {len(cloud)} points {'lies' if behind == 1 else 'lie'} behind others as seen from the viewpoint: left out"
+        )
         return (Side(cloud.select(kept), note),)
     up = _thinnest(sample)
     if not _has_two(*_along(sample, up)):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy import ndarray
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.dryrun.margin import Margin
 from weldsim.dryrun.margins import joint_speeds
 from weldsim.dryrun.verdict import DryRun, Fix, Trial, Verdict, runs, span
@@ -53,7 +54,7 @@ def _broken(fix: Fix) -> str:
 def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[dict[str, Any]], speed_limit: float) -> str:
     failure = trial.failure
     what = "motion" if trial.verdicts[0].line else "waypoint"
-    said = f"{units.to_mm(trial.length):.0f} mm long, {len(trial.verdicts)} {what}s"
+    said = f"{units.to_mm(trial.length):.0f} mm long, {counted(len(trial.verdicts), what)}"
     parts = [f"<section><h2>{escape(trial.name)}: {'would pass' if failure is None else 'would fail'}</h2><p>{escape(said)}</p>"]
     if failure is not None:
         parts.append(f'<ul class="reasons"><li>{escape(place(failure))}: {escape(failure.why)}: {escape(failure.text)}</li></ul>')
@@ -67,7 +68,10 @@ def _trial(trial: Trial, fixes: tuple[Fix, ...], png: bytes | None, drawn: list[
     if png is not None:
         image = base64.b64encode(png).decode()
         title = "First failure" if failure is not None else "Halfway"
-        parts.append(f'<section><h2>{title}</h2><img style="max-width:100%" src="data:image/png;base64,{image}"></section>')
+        alt = escape(f"{trial.name}: the arm {'where it fails first' if failure is not None else 'halfway'}")
+        parts.append(
+            f'<section><h2>{title}</h2><img style="max-width:100%" alt="{alt}" src="data:image/png;base64,{image}"></section>'
+        )
     if trial.margins:
         parts.append(f"<section><h2>Clearance and margins</h2>{_margins(trial.margins)}</section>")
     parts.append(f"<section><h2>{what.capitalize()}s</h2>{_waypoints(trial, what)}</section>")
@@ -101,7 +105,9 @@ def _waypoints(trial: Trial, what: str) -> str:
     for first, last in found[:ROWS]:
         s = _span(first.s, last.s)
         mark = '<td class="mark ok">ok</td>' if first.ok else f'<td class="mark no">{escape(first.why)}</td>'
-        rows.append(f'<tr><td>{escape(span(first, last))}</td><td class="num">{s}</td>{mark}<td>{escape(first.text)}</td></tr>')
+        rows.append(
+            f'<tr><td class="num">{escape(span(first, last))}</td><td class="num">{s}</td>{mark}<td>{escape(first.text)}</td></tr>'
+        )
     more = f"<p>and {len(found) - ROWS} more</p>" if len(found) > ROWS else ""
     head = f"<tr><th>{what}</th><th>s</th><th>verdict</th><th>reason</th></tr>"
     return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>{more}"
@@ -130,11 +136,12 @@ def _plot(drawn: list[dict[str, Any]], title: str, t: ndarray, values: ndarray, 
         "xaxis": {**axis, "title": {"text": "time [s]"}},
         "yaxis": {**axis, "title": {"text": label}, "range": [-1.12 * limit, 1.12 * limit]},
     }
+    unit = label[label.index("[") + 1 : label.index("]")]
     line = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "line": {"color": BAD, "width": 1, "dash": "dot"}}
     layout["shapes"] = [{**line, "y0": edge, "y1": edge} for edge in (-limit, limit)]
     word = {"x": 1, "xref": "paper", "xanchor": "right", "showarrow": False, "font": {"size": 10, "color": BAD}}
     layout["annotations"] = [
-        {**word, "y": edge, "yanchor": anchor, "text": f"limit {edge:+.0f}"}
+        {**word, "y": edge, "yanchor": anchor, "text": f"limit {edge:+.0f} {unit}"}
         for edge, anchor in ((limit, "top"), (-limit, "bottom"))
     ]
     shade_arc(layout, trial.t, trial.arc_on)

@@ -19,6 +19,7 @@ from weldsim.columns import (
     read_name,
     unit_of_comments,
 )
+from weldsim.counted import counted
 from weldsim.errors import InputError
 from weldsim.frames import matrix_from_quaternion, matrix_from_rotation_vector, rotation_vector_from_matrix
 from weldsim.records import MILLIMETRE_SPAN
@@ -89,7 +90,7 @@ def read_poses(text: str, where: str) -> PoseTable:
     assert table is not None
     body = [(number, line) for number, line in body if number > table.first]
     if len(body) < 2:
-        raise InputError(f"{where}: {len(body)} poses; a path needs two", path=where)
+        raise InputError(f"{where}: {counted(len(body), 'pose')}; a path needs two", path=where)
     columns, label = _columns(table, lines, where)
     rows, labels = [], []
     for number, line in body:
@@ -334,5 +335,7 @@ def _refuse_width(width: int, table: TextTable, number: int, where: str) -> None
     elif width > len(WANTED) and not table.names:
         hint = " (name them on the first line)"
     raise InputError(
-        f"{where}: line {number}: {width} columns, expected {expected}: x y z rx ry rz [m, rad]{hint}", path=where, line=number
+        f"{where}: line {number}: {counted(width, 'column')}, expected {expected}: x y z rx ry rz [m, rad]{hint}",
+        path=where,
+        line=number,
     )

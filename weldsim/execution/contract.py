@@ -112,7 +112,7 @@ def contract(
 def _model(facts: RobotFacts) -> Clause:
     return Clause(
         name="arm model",
-        value=f"{facts.model} {facts.serial}".strip(),
+        value=facts.model + (f", serial number {facts.serial}" if facts.serial else ""),
         expected=MODEL,
         passed=facts.model.upper() == MODEL,
         advice="plans are made for a UR5; another arm has other links",

@@ -116,7 +116,7 @@ class SimulatedRobot(Robot):
             model="UR5",
             series="simulated",
             version=mujoco.__version__,
-            serial="0",
+            serial="",  # there is no arm to number
             dh=DH,
             X_FT=X_FT,
             payload_kg=PAYLOAD,

@@ -95,7 +95,7 @@ class UrRobot(Robot):
         self._taken.clear()
         self._sent = deque(maxlen=math.ceil((self.config.buffer + self.config.lookahead + FOLLOW_SPAN) / self.period))
         self._judge_every = max(1, round(FOLLOW_EVERY / self.period))
-        self._note("connection", f"{link.identity.model} {link.identity.serial}, software {link.identity.software}")
+        self._note("connection", f"{link.identity.model}, serial number {link.identity.serial}, software {link.identity.software}")
         if not link.identity.program.startswith("STOPPED"):
             self._note("connection", f"stopped what ran before: {link.identity.program}")
 

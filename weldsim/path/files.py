@@ -16,12 +16,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from weldsim.counted import counted
 from weldsim.errors import InputError
 from weldsim.frames import Transform
 from weldsim.mounts import X_FT
 from weldsim.output import write_whole
 from weldsim.quantity import MetrePerSecond
 from weldsim.records import MILLIMETRE_SPAN, Seam, Segment, TorchPath
+from weldsim.rounded import rounded
 
 SCHEMA = "weldsim.path/1"
 DECIMALS = 9  # a nanometre, a nanoradian: below any sensor, above the rounding noise of another machine
@@ -53,7 +55,10 @@ def path_document(
         InputError: seams and paths that do not pair up.
     """
     if len(seams) != len(paths):
-        raise InputError(f"path document: {len(seams)} seams and {len(paths)} torch paths; each seam needs one", seams=len(seams))
+        raise InputError(
+            f"path document: {counted(len(seams), 'seam')} and {counted(len(paths), 'torch path')}; each seam needs one",
+            seams=len(seams),
+        )
     named = numbers or range(1, len(seams) + 1)
     entries = list(zip(named, seams, paths, strict=True))
     reasons = refused or {}
@@ -77,7 +82,7 @@ def path_text(document: dict[str, Any], *, timing: bool = True) -> str:
     """The document as JSON text, one pose a line; without the run times when `timing` is false (for comparisons)."""
     kept = dict(document) if timing else {**document, "timing": {}}
     seams = kept.pop("seams")
-    head = json.dumps(kept, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    head = json.dumps(rounded(kept), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     body = ",\n".join(_seam_text(seam) for seam in seams)
     return f'{head[:-1]},\n"seams":[{body}]}}\n'
 
@@ -217,12 +222,12 @@ def _check_seam(seam: Any, where: str) -> None:
     speed = seam.get("speed", 1.0)
     _need(type(speed) in (int, float) and math.isfinite(speed) and speed > 0, where, f"speed {speed!r} m/s is not positive")
     points = _array(seam.get("points"), (3,), f"{where}.points")
-    _need(len(points) >= 2, where, f"{len(points)} points; a seam needs two")
+    _need(len(points) >= 2, where, f"{counted(len(points), 'point')}; a seam needs two")
     _array(seam.get("sigma", []), (), f"{where}.sigma")
     _array(seam.get("gaps", []), (2,), f"{where}.gaps")
     poses = seam.get("poses")
     _need(isinstance(poses, list) and all(isinstance(pose, dict) for pose in poses), where, "poses is no list of objects")
-    _need(len(poses) >= 2, where, f"{len(poses)} poses; a path needs two")
+    _need(len(poses) >= 2, where, f"{counted(len(poses), 'pose')}; a path needs two")
     position = _array([pose.get("position") for pose in poses], (3,), f"{where}.position")
     quaternion = _array([pose.get("quaternion_wxyz") for pose in poses], (4,), f"{where}.quaternion_wxyz")
     s = _array([pose.get("s") for pose in poses], (), f"{where}.s")
@@ -260,5 +265,5 @@ def _array(values: Any, tail: tuple[int, ...], where: str) -> Float[ndarray, "..
     _need(numeric and shaped, where, f"must be a list of {'numbers' if not tail else f'{tail[0]} numbers each'}")
     array = array.astype(float).reshape(-1, *tail)
     bad = int((~np.isfinite(array)).sum())
-    _need(bad == 0, where, f"{bad} values are not finite")
+    _need(bad == 0, where, f"{counted(bad, 'value')} {'is' if bad == 1 else 'are'} not finite")
     return array

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
+from weldsim.counted import counted
 from weldsim.errors import RecordError
 from weldsim.frames import read_only
 
@@ -18,7 +19,8 @@ def store(record: object, name: str, value: Any, *, shape: tuple[int | str, ...]
     if array.ndim != len(shape) or any(isinstance(want, int) and got != want for got, want in zip(array.shape, shape, strict=True)):
         raise RecordError(f"{where}: shape {array.shape}, expected ({', '.join(map(str, shape))})", field=name)
     if not nan and array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise RecordError(f"{where}: {int((~np.isfinite(array)).sum())} values are not finite", field=name)
+        bad = int((~np.isfinite(array)).sum())
+        raise RecordError(f"{where}: {counted(bad, 'value')} {'is' if bad == 1 else 'are'} not finite", field=name)
     object.__setattr__(record, name, array)
 
 

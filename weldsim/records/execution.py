@@ -35,7 +35,7 @@ class RobotFacts:
 
     Attributes:
         model: of the arm, "UR5" say.  series: of the controller, "cb3", "e" or "simulated".
-        version: of its software, "3.15.8" say.  serial: of the arm.
+        version: of its software, "3.15.8" say.  serial: of the arm, "" where it has none.
         dh: (6, 4) DH parameters (theta offset [rad], a [m], d [m], alpha [rad]) a joint, factory calibration included, in UR's
             own convention (standard DH: a and alpha lie behind the joint's d).
         dh_note: how good they are in the controller's word, "calibrated" say; where dh is None, why, in one word.

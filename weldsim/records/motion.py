@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from weldsim.counted import counted
 from weldsim.frames import Transform
 from weldsim.records.checks import check_increasing, check_metres, require, store
 
@@ -45,14 +46,14 @@ class TorchPath:
     def __post_init__(self) -> None:
         require(self.X_BT.names == "BT" and len(self.X_BT.batch) == 1, self, "X_BT", "must be a batch of X_BT")
         n = len(self.X_BT)
-        require(n >= 2, self, "X_BT", f"{n} poses; a path needs two")
+        require(n >= 2, self, "X_BT", f"{counted(n, 'pose')}; a path needs two")
         check_metres(self, "X_BT", self.X_BT.p)
         store(self, "s", self.s, shape=(n,))
         require(bool((np.diff(self.s) >= 0).all()), self, "s", "decreases")
         store(self, "speed", self.speed, shape=(n,))
         require(bool((self.speed > 0).all()), self, "speed", "must be positive")
         store(self, "arc_on", self.arc_on, shape=(n,), dtype=bool)
-        require(len(self.segments) == n, self, "segments", f"{len(self.segments)} names for {n} poses")
+        require(len(self.segments) == n, self, "segments", f"{counted(len(self.segments), 'name')} for {counted(n, 'pose')}")
         weld = np.array([segment == Segment.WELD for segment in self.segments])
         require(not bool((self.arc_on & ~weld).any()), self, "arc_on", "the arc burns outside WELD")
         if self.sigma is not None:
@@ -94,5 +95,5 @@ class JointTrajectory:
             store(self, name, getattr(self, name), shape=(k, 6))
         store(self, "s", self.s, shape=(k,))
         store(self, "arc_on", self.arc_on, shape=(k,), dtype=bool)
-        require(len(self.segments) == k, self, "segments", f"{len(self.segments)} names for {k} instants")
+        require(len(self.segments) == k, self, "segments", f"{counted(len(self.segments), 'name')} for {counted(k, 'instant')}")
         require(len(self.joint_names) == 6, self, "joint_names", "six are needed")

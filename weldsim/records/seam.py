@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from weldsim.counted import counted
 from weldsim.errors import RecordError
 from weldsim.records.checks import check_increasing, check_metres, check_unit, require, store
 
@@ -62,7 +63,7 @@ class Seam:
     def __post_init__(self) -> None:
         store(self, "points_B", self.points_B, shape=("n", 3))
         n = len(self.points_B)
-        require(n >= 2, self, "points_B", f"{n} points; a seam needs two")
+        require(n >= 2, self, "points_B", f"{counted(n, 'point')}; a seam needs two")
         check_metres(self, "points_B", self.points_B)
         store(self, "s", self.s, shape=(n,))
         check_increasing(self, "s", self.s)
@@ -117,7 +118,7 @@ class Seam:
         keep = np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > SAME_PLACE])
         line, up = line[keep], np.broadcast_to(up, line.shape)[keep]
         if len(line) < 2:
-            raise RecordError(f"Seam.points_B: {len(line)} places; a seam needs two", field="points_B")
+            raise RecordError(f"Seam.points_B: {counted(len(line), 'place')}; a seam needs two", field="points_B")
         _check_turns(line)
         if not (np.linalg.norm(up, axis=1) > 0).all():
             raise RecordError("Seam.normals_B: a normal is zero", field="normals_B")

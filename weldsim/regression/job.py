@@ -3,7 +3,6 @@
 This runs in worker processes, one core each, and its figures do not depend on which worker it was.
 """
 
-import json
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -16,12 +15,11 @@ from threadpoolctl import threadpool_limits
 
 from weldsim.config import CellConfig, digest, to_json
 from weldsim.errors import InputError, MotionError, WeldsimError
-from weldsim.output import write_whole
 from weldsim.pipeline import Clock, Finder, PlanResult, RunResult, SensorName, Sighting, finish, look, plan, true_region
 from weldsim.records import Rejection, SeamFindings
 from weldsim.regression.figures import Figures, figures_of
 from weldsim.regression.golden import Deviation, Entries, compare
-from weldsim.run_folder import MANIFEST, SCHEMA, check_run_folder, write_run
+from weldsim.run_folder import MANIFEST, SCHEMA, check_run_folder, write_json, write_run
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
@@ -177,9 +175,9 @@ def _unseen(task: Task, method: str, error: WeldsimError) -> Row:
         check_run_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
         resolved = {"cell": to_json(task.methods[method]), "scene": to_json(task.scene), "seed": task.seed}
-        write_whole(folder / "config.json", json.dumps(resolved, indent=2) + "\n")
+        write_json(folder / "config.json", resolved, exact=True)
         said = {"schema": SCHEMA, "scene": task.scene.name, "seed": task.seed, "method": method, "refused": str(error)}
-        write_whole(folder / MANIFEST, json.dumps(said, indent=2) + "\n")
+        write_json(folder / MANIFEST, said)
     judged = any(entry.judges(task.seed) for entry in entries.values())
     return Row(figures=figures, deviations=deviations, judged=judged, folder=None if folder is None else str(folder))
 

@@ -5,11 +5,12 @@ from html import escape
 from pathlib import Path
 
 from weldsim import __version__
+from weldsim.counted import counted
 from weldsim.output import write_whole
 from weldsim.regression.figures import FIGURES
 from weldsim.regression.job import Row
 from weldsim.regression.suite import Regression
-from weldsim.regression.text import HEAD, counted, number, rows_of_text, sentence, shift_sentence, unjudged
+from weldsim.regression.text import HEAD, number, rows_of_text, sentence, shift_sentence, unjudged
 from weldsim.report.html import STYLE
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
@@ -20,7 +21,7 @@ main{max-width:1600px}
 table{font-size:13px}th{font-size:12px;vertical-align:bottom}
 td,th{padding-right:6px;overflow-wrap:normal}td.num,td.worse{white-space:nowrap}td.name{min-width:7.5em;overflow-wrap:anywhere}
 .seeds table{font-size:12px}.seeds th{font-size:11px}
-@media(max-width:1100px){.seeds table,.seeds th{font-size:10px}.seeds th{overflow-wrap:anywhere}.seeds td.name{min-width:4em}}
+@media(max-width:1100px){.seeds table,.seeds th{font-size:10px}.seeds td.name{min-width:4em}}
 td.why{color:var(--soft);padding-left:16px;border-top:0}
 """
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from weldsim.cloud.files import LengthUnit, read_cloud
 from weldsim.config import CellConfig
+from weldsim.counted import counted
 from weldsim.curves import arc_length, resample, tangents
 from weldsim.errors import InputError
 from weldsim.frames import unit
@@ -40,7 +41,7 @@ def read_known_seam(path: str | Path, *, unit_of_length: LengthUnit = "m") -> Kn
     moved = np.concatenate([[True], np.linalg.norm(np.diff(read.points, axis=0), axis=1) > 1e-9])
     points = read.points[moved]
     if len(points) < 2:
-        raise InputError(f"{path}: {len(points)} different points; a seam needs two", path=str(path))
+        raise InputError(f"{path}: {counted(len(points), 'different point')}; a seam needs two", path=str(path))
     line = resample(points, STEP)
     along = tangents(line)
     if read.normals is None:

@@ -3,6 +3,7 @@
 import statistics
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.regression.distribution import EVERY_SCENE, FALSE_ALARMS, Shift
 from weldsim.regression.figures import FIGURES, Figures
 from weldsim.regression.finders import METHODS
@@ -54,7 +55,7 @@ def shift_sentence(shift: Shift) -> str:
     if s.scene != EVERY_SCENE:
         worse = f"median {number(s.figure, s.value)}, of those recorded {number(s.figure, s.golden)}: {worse}"
     chances = f"by chance once in {1 / max(s.chance, 1e-12):.3g} runs (limit once in {1 / s.limit:.3g})"
-    return f"{s.scene}, {s.method}, {s.seeds} seed{'s' if s.seeds > 1 else ''}: {figure.label} {worse}, {chances}"
+    return f"{s.scene}, {s.method}, {counted(s.seeds, 'seed')}: {figure.label} {worse}, {chances}"
 
 
 def unjudged(outcome: Regression) -> str:
@@ -110,11 +111,6 @@ def rows_of_text(outcome: Regression) -> list[list[str]]:
                 cells.append(ends[0] if same else " / ".join(ends))
             out.append([scene, method, f"{hit}/{known}", *cells, standing(outcome, scene, method)])
     return out
-
-
-def counted(count: int, word: str) -> str:
-    """ "1 seed", "3 seeds"."""
-    return f"{count} {word if count == 1 else f'{word}es' if word.endswith('s') else f'{word}s'}"
 
 
 def refusals(outcome: Regression) -> list[str]:

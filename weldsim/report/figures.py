@@ -21,9 +21,11 @@ Figure = dict[str, Any]
 CLOUD_LIMIT = 60_000  # points drawn
 LONGEST = 1.0  # side of the scene, in units of plotly's camera
 SEEN = 0.68 * np.tan(np.pi / 8)  # half the height that plotly's camera sees at distance 1, without the room that labels take
-WIDER = 1.6  # how much wider than high a scene is on a narrow page
+WIDER = 1.6  # how much wider than high a scene is on a wide page
+NARROW = 1.3  # on a narrower one than this the eye stands back, chosen: titles of the axes are whole at 800 and at 1280 pixels
 POLE = 0.05  # [m] height of the mark where a weld was stopped, over the seam
 TICKS = 10  # on the longest side of the scene, fewer on shorter ones: they have to stand apart
+LABEL = 28  # [px] height of a label of two lines
 LINE_LIMIT = 3000  # samples drawn of one line
 
 
@@ -77,7 +79,7 @@ def scene(
     layout |= {
         "scene": {
             **{
-                f"{name}axis": {**axis, "title": {"text": f"{name} in base [mm]"}, "nticks": max(3, round(TICKS * side / LONGEST))}
+                f"{name}axis": {**axis, "title": {"text": f"{name} [mm]"}, "nticks": max(3, round(TICKS * side / LONGEST))}
                 for name, side in zip("xyz", shape, strict=True)
             },
             "aspectmode": "manual",
@@ -107,7 +109,7 @@ def _fitted(points_B: ndarray, towards: ndarray, up: ndarray) -> tuple[ndarray, 
 
 
 def uncertainty(seam: Seam) -> Figure:
-    """Standard deviation across the seam, and the width between the lips, along it."""
+    """Standard deviation across the seam, and the width between the lips, along it; each where it was measured."""
     s = 1e3 * seam.s
     data, top = [], {"yaxis": 0.0, "yaxis2": 0.0}
     if seam.sigma is not None:
@@ -118,17 +120,19 @@ def uncertainty(seam: Seam) -> Figure:
         top["yaxis2"] = 1.15 * float(width.max())
         data.append(_trace("width, right scale", s, width, WIRE, dash="dot", yaxis="y2"))
     layout = _layout("along the seam [mm]", "sigma [mm]")
-    layout["yaxis2"] = {
-        "overlaying": "y",
-        "side": "right",
-        "title": {"text": "width [mm]"},
-        "showgrid": False,
-        "tickmode": "auto",
-        "linecolor": GRID,
-    }
+    if top["yaxis2"] > 0:
+        layout["yaxis2"] = {
+            "overlaying": "y",
+            "side": "right",
+            "title": {"text": "width [mm]"},
+            "showgrid": False,
+            "tickmode": "auto",
+            "linecolor": GRID,
+        }
+        layout["margin"]["r"] = 56
     for axis, value in top.items():
-        layout[axis] |= {"range": [0.0, value]} if value > 0 else {"visible": False}
-    layout["margin"]["r"] = 56
+        if axis in layout:
+            layout[axis] |= {"range": [0.0, value]} if value > 0 else {"visible": False}
     layout["shapes"] = [  # what was not measured
         {"type": "rect", "xref": "x", "yref": "paper", "x0": 1e3 * s0, "x1": 1e3 * s1, "y0": 0, "y1": 1}
         | {"line": {"width": 0}, "fillcolor": "rgba(120,120,120,0.18)", "layer": "below"}
@@ -174,16 +178,28 @@ def errors_distance(lines: dict[str, ErrorLine], config: ReportConfig) -> Figure
         for name, line in lines.items()
     ]
     layout = _layout("along the seam [mm]", "cross-track distance [mm]")
-    layout["yaxis"]["rangemode"] = "tozero"
     limits = {"mean": config.mean, "p95": config.p95, "max": config.max}
-    layout["shapes"] = [_level(units.to_mm(value)) for value in limits.values()]
+    levels = {name: units.to_mm(value) for name, value in sorted(limits.items(), key=lambda limit: limit[1])}
+    top = 1.06 * max(*levels.values(), *(1e3 * float(line.distance.max()) for line in lines.values()))
+    layout["yaxis"]["range"] = [0.0, top]
+    layout["shapes"] = [_level(level) for level in levels.values()]
+    height = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
+    places = _spread(list(levels.values()), LABEL * top / height)
     layout["annotations"] = [
-        {"x": 1.01, "xref": "paper", "xanchor": "left", "y": units.to_mm(value), "yanchor": "middle", "showarrow": False}
+        {"x": 1.01, "xref": "paper", "xanchor": "left", "y": place, "yanchor": "middle", "showarrow": False}
         | {"text": f"limit of<br>{name}", "align": "left", "font": {"size": 10, "color": SOFT}}
-        for name, value in limits.items()
+        for name, place in zip(levels, places, strict=True)
     ]
     layout["margin"]["r"] = 56  # beside the plot: in it a line would run through the words
     return {"data": data, "layout": layout}
+
+
+def _spread(places: list[float], apart: float) -> list[float]:
+    """The places of labels, in order, each moved up until it stands `apart` from the one below."""
+    out: list[float] = []
+    for place in places:
+        out.append(place if not out else max(place, out[-1] + apart))
+    return out
 
 
 def torch_speed(log: ExecutionLog, path: TorchPath, config: ReportConfig, stopped: float | None = None) -> Figure | None:

@@ -1,5 +1,6 @@
 """The report as one self-contained page: verdict, figures beside their limits, pictures. It asks nothing of any network."""
 
+import base64
 import importlib.resources
 import json
 from collections.abc import Mapping
@@ -7,11 +8,13 @@ from html import escape
 from pathlib import Path
 
 from weldsim import units
+from weldsim.counted import counted
+from weldsim.kinematics import JOINT_NAMES
 from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, SeamFindings, Threshold, TorchPath, WeldReport
 from weldsim.report import figures
 from weldsim.report.limits import Check, ReportConfig, checks
-from weldsim.report.verdict import look, stopped_place, verdict
+from weldsim.report.verdict import PATH_FILE, found_by, look, stopped_place, verdict
 from weldsim.report.view import cross_section, error_lines, shows_surface
 
 STYLE = """
@@ -39,14 +42,30 @@ tr:last-child td{border-bottom:0}.num{white-space:nowrap}
 .checks th:first-child{width:42%}.checks th:last-child{width:14%}
 .mark{white-space:nowrap;font-weight:600}.mark.ok{color:var(--good)}.mark.no{color:var(--bad)}.mark.look{color:var(--amber)}
 .bar{height:10px;background:#7d9bb8;border-radius:3px;min-width:2px}
+main>p{margin:0 0 16px}
+.still img{width:100%;height:auto;display:block}
 footer{color:var(--soft);font-size:13px;overflow-wrap:anywhere}
 """
 # No address may be loaded, whatever a file name or a library slips in; plotly's shaders need eval and blobs.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
 )
+# A scene needs WebGL: where there is none its still picture stays. On a narrow page the eye stands back, or the titles of the axes
+# would be cut off.
 DRAW = """
+const GL = (() => {
+  const canvas = document.createElement("canvas");
+  try { return Boolean(canvas.getContext("webgl2") || canvas.getContext("webgl")); } catch { return false; }
+})();
 for (const f of FIGURES) {
+  const place = document.getElementById(f.id);
+  if ("scene" in f.layout) {
+    if (!GL) { place.hidden = true; continue; }
+    for (const still of document.querySelectorAll(`[data-still="${f.id}"]`)) { still.hidden = true; }
+    const margin = f.layout.margin, width = place.clientWidth - margin.l - margin.r;
+    const back = Math.max(1, f.narrow * (f.layout.height - margin.t - margin.b) / Math.max(width, 1));
+    for (const [axis, value] of Object.entries(f.layout.scene.camera.eye)) { f.layout.scene.camera.eye[axis] = back * value; }
+  }
   Plotly.newPlot(f.id, f.data, f.layout, {responsive: true, displaylogo: false, displayModeBar: "scene" in f.layout});
 }
 """
@@ -63,8 +82,9 @@ def write_html(
     known: tuple[KnownSeam, ...] = (),
     welded: int = 0,
     others: Mapping[int, ExecutionLog] | None = None,
-    joint_names: tuple[str, ...] = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3"),
+    joint_names: tuple[str, ...] = tuple(name.replace("_", " ") for name in JOINT_NAMES),
     config: ReportConfig | None = None,
+    still: bytes | None = None,
 ) -> Path:
     """The page written, about 5 MB of it plotly.js. Raises OutputError.
 
@@ -76,21 +96,24 @@ def write_html(
         others: what the arm did along other paths of the job, by their index.
         joint_names: in the order of the log's columns.
         config: the limits the verdict was made with.
+        still: the job's picture, a PNG, shown in place of the 3D figure by a browser that cannot draw that.
     """
     config = config or ReportConfig()
     drawn: list[figures.Figure] = []
     body = [_header(report, findings, config), _cards(report, findings, welded), _checks(checks(report, config))]
     driven = tuple(each for each in (log, *(others or {}).values()) if each is not None)
     scene = figures.scene(cloud, findings, paths, driven, known, stopped_place(report))
-    body.append(_figure(drawn, "Cloud, seam and torch path", scene))
+    body.append(_scene(drawn, _shown(cloud, findings, paths), scene, still))
     stopped = None if report.stopped is None or report.progress is None else report.progress.s_to
     logs = {welded: log, **(others or {})}
     for index, each in logs.items():
         here = stopped if index == list(logs)[-1] else None  # the job ended there
         plots = _plots(drawn, cloud, findings, paths, each, known, index, joint_names, config, here)
         title = f"<h2>Seam {index + 1}</h2>" if len(findings.seams) > 1 else ""
-        body.append(f'{title}<div class="two">{"".join(plots)}</div>')
-    body.append(f'<div class="two">{_seams(findings)}{_refused(findings)}{_threshold(findings.threshold)}{_timing(report)}</div>')
+        body.append(f'{title}<div class="two">{"".join(plots)}</div>' if plots else "")
+    body.append(
+        f'<div class="two">{_seams(findings)}{_refused(report, findings)}{_threshold(findings.threshold)}{_timing(report)}</div>'
+    )
     body.append(_footer(report))
     return write_whole(path, _page(report.scene, "".join(body), drawn))
 
@@ -128,8 +151,10 @@ def _plots(
         seam = findings.seams[welded]
         if shows_surface(cloud, (seam,)):  # a path that came from a file has no cloud about it
             out.append(_figure(drawn, "Mean cross-section", figures.section(cross_section(cloud, seam))))
-        if seam.sigma is not None or seam.left_B is not None:
-            out.append(_figure(drawn, "Standard deviation and width along the seam", figures.uncertainty(seam)))
+        measured = {"standard deviation": seam.sigma is not None, "width": seam.left_B is not None and seam.right_B is not None}
+        named = [name for name, there in measured.items() if there]  # a path that came from a file has no lips
+        if named:
+            out.append(_figure(drawn, f"{' and '.join(named).capitalize()} along the seam", figures.uncertainty(seam)))
     path = paths[welded] if welded < len(paths) else None
     if log is not None and path is not None:
         speed = figures.torch_speed(log, path, config, stopped)
@@ -140,6 +165,30 @@ def _plots(
         if log.torque is not None:
             out.append(_figure(drawn, "Joint torques", figures.joints(log, "torque", joint_names)))
     return out
+
+
+def _shown(cloud: PointCloud, findings: SeamFindings, paths: tuple[TorchPath | None, ...]) -> str:
+    """What the 3D figure shows, in words: "Cloud, seam and torch path in the robot base"."""
+    parts = ["cloud"] if shows_surface(cloud, findings.seams) else []
+    parts += ["seam" if len(findings.seams) == 1 else "seams"] if findings.seams else []
+    driven = sum(path is not None for path in paths)
+    parts += ["torch path" if driven == 1 else "torch paths"] if driven else []
+    *others, last = parts
+    return f"{', '.join(others)}{' and ' if others else ''}{last} in the robot base".capitalize()
+
+
+def _scene(drawn: list[figures.Figure], title: str, figure: figures.Figure, still: bytes | None) -> str:
+    """The section of the 3D figure, with what stays where a browser does not draw it."""
+    name = f"figure-{len(drawn) + 1}"
+    why = "This browser draws no 3D figure: WebGL or scripts are missing or switched off."
+    if still is not None:
+        image = base64.b64encode(still).decode()
+        picture = f'<img alt="{escape(title)}" src="data:image/png;base64,{image}">'
+        why = f"{why} The still picture:"
+    else:
+        picture = ""
+    instead = f'<div class="still" data-still="{name}"><p>{why}</p>{picture}</div>'
+    return _figure(drawn, title, {**figure, "narrow": figures.NARROW}).replace("</h2>", f"</h2>{instead}", 1)
 
 
 def _figure(drawn: list[figures.Figure], title: str, figure: figures.Figure) -> str:
@@ -154,7 +203,7 @@ def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) ->
     listed = "" if report.passed else "".join(f"<li>{escape(reason)}</li>" for reason in report.reasons)
     on = (report.way_on,) if report.way_on else ()
     listed += "".join(f"<li>{escape(clause)}</li>" for clause in (*on, *report.warnings, *report.unplanned))
-    facts = f"{why}; method {report.method}" + ("" if report.seed is None else f", seed {report.seed}")
+    facts = f"{why}; {found_by(report)}" + ("" if report.seed is None else f", seed {report.seed}")
     return (
         f"<header><div><h1>{escape(report.scene)}</h1><p>{escape(facts)}</p></div>"
         f'<div class="verdict {look(word)}">{escape(word)}</div></header>'
@@ -165,7 +214,8 @@ def _header(report: WeldReport, findings: SeamFindings, config: ReportConfig) ->
 def _cards(report: WeldReport, findings: SeamFindings, welded: int) -> str:
     """The handful of numbers that are read first; of several seams, those of the first that was welded."""
     count = len(findings.seams)
-    cards: list[tuple[str, str]] = [(str(count), "seam found" if count == 1 else "seams found")]
+    told = "in the path file" if report.method == PATH_FILE else "found"
+    cards: list[tuple[str, str]] = [(str(count), f"{'seam' if count == 1 else 'seams'} {told}")]
     if findings.seams:
         index = welded if welded < count else 0
         seam = findings.seams[index]
@@ -180,7 +230,7 @@ def _cards(report: WeldReport, findings: SeamFindings, welded: int) -> str:
             cards.append((f"{units.to_mm(float(seam.sigma.mean())):.2f} mm", "sigma across, mean"))
         if seam.gaps:
             missing = sum(s1 - s0 for s0, s1 in seam.gaps)
-            cards.append((f"{units.to_mm(missing):.1f} mm", f"not measured, in {len(seam.gaps)} gap{'s'[: len(seam.gaps) > 1]}"))
+            cards.append((f"{units.to_mm(missing):.1f} mm", f"not measured, in {counted(len(seam.gaps), 'gap')}"))
     for name, error in (("plan", report.plan), ("executed", report.executed)):
         if error is not None:
             cards.append((f"{units.to_mm(error.mean):.2f} mm", f"{name} from the known {error.reference}, mean"))
@@ -228,7 +278,9 @@ def _seams(findings: SeamFindings) -> str:
     )
 
 
-def _refused(findings: SeamFindings) -> str:
+def _refused(report: WeldReport, findings: SeamFindings) -> str:
+    if report.method == PATH_FILE:  # nothing was looked for
+        return ""
     rows = []
     for r in findings.rejected:
         where = ", ".join(f"{units.to_mm(v):.0f}" for v in r.position_B)

@@ -16,13 +16,14 @@ from matplotlib.patheffects import withStroke
 from numpy import ndarray
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.output import write_whole
 from weldsim.records import ExecutionLog, KnownSeam, PointCloud, Seam, SeamFindings, TorchPath, WeldReport
 from weldsim.report.limits import ReportConfig
 from weldsim.report.plane import Plane, Seen, plane_of
 from weldsim.report.style import AMBER, BAD, GOOD, GRID, INK, LINES, LIPS, SEAM, SOFT, WIDTHS, WIRE
 from weldsim.report.tracking import speed_error
-from weldsim.report.verdict import look, stopped_place, verdict
+from weldsim.report.verdict import found_by, look, stopped_place, verdict
 from weldsim.report.view import (
     MARGIN,
     CrossSection,
@@ -40,6 +41,8 @@ ASLANT = 0.3  # sine of the angle to the seams from which on a wire stands out f
 LAYER = 0.03  # [m] points this far below another in their pixel are hidden by it
 RATIO = 0.72  # height of the plan view over its width
 PIXEL = 1e-3  # [m] of the plan view
+APART = 40  # [px] between the two texts under the headline
+REFUSED = 58  # characters in a line of the list of candidates refused: those fit beside the plan view
 
 
 def write_png(
@@ -55,6 +58,21 @@ def write_png(
     config: ReportConfig | None = None,
 ) -> Path:
     """The picture written, 1600 x 900 pixels. Raises OutputError."""
+    return write_whole(path, png(report, cloud, findings, paths, log=log, known=known, welded=welded, config=config))
+
+
+def png(
+    report: WeldReport,
+    cloud: PointCloud,
+    findings: SeamFindings,
+    paths: tuple[TorchPath | None, ...],
+    *,
+    log: ExecutionLog | None = None,
+    known: tuple[KnownSeam, ...] = (),
+    welded: int = 0,
+    config: ReportConfig | None = None,
+) -> bytes:
+    """The picture as a PNG of 1600 x 900 pixels."""
     figure = Figure(figsize=(16, 9), dpi=100, facecolor="white")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(2, 2, left=0.05, right=0.97, top=0.86, bottom=0.08, width_ratios=(1.75, 1), hspace=0.34, wspace=0.16)
@@ -81,7 +99,7 @@ def write_png(
         lower.set_axis_off()
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": "weldsim"})
-    return write_whole(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, welded: int, config: ReportConfig) -> None:
@@ -99,14 +117,18 @@ def _headline(figure: Figure, report: WeldReport, findings: SeamFindings, welded
         ha="right",
     )
     count = len(findings.seams)
-    facts = [f"{count} seam{'' if count == 1 else 's'}", f"method {report.method}"]
+    facts = [counted(count, "seam"), found_by(report)]
     if count:
         seam = findings.seams[welded]
         facts.append(f"{'' if count == 1 else f'seam {welded + 1}: '}{units.to_mm(seam.length):.1f} mm long")
         facts += [f"{units.to_mm(seam.width):.1f} mm wide"] if seam.width > 0 else []  # 0: the method measures none
         facts += [f"confidence {seam.confidence:.2f}"] if seam.confidence > 0 else []
-    figure.text(0.05, 0.905, "   |   ".join(facts), fontsize=12, color=SOFT, va="center")
-    figure.text(0.97, 0.905, textwrap.shorten(why, 90, placeholder=" ..."), fontsize=12, color=SOFT, va="center", ha="right")
+    left = figure.text(0.05, 0.905, "   |   ".join(facts), fontsize=12, color=SOFT, va="center")
+    right = figure.text(0.97, 0.905, "", fontsize=12, color=SOFT, va="center", ha="right")
+    for most in range(90, 10, -4):  # characters, until it stands clear of the facts
+        right.set_text(textwrap.shorten(why, most, placeholder=" ..."))
+        if right.get_window_extent().x0 > left.get_window_extent().x1 + APART:
+            break
 
 
 def _plan_view(
@@ -334,7 +356,7 @@ def _along(
         axes.set_title("Standard deviation along the seam", loc="left", fontsize=13, color=INK)
         axes.set_ylabel("sigma [mm]")
     else:
-        axes.set_title("The method gives no standard deviation", loc="left", fontsize=13, color=SOFT)
+        axes.set_title("No standard deviation is known along the seam", loc="left", fontsize=13, color=SOFT)
         axes.set_axis_off()
         return
     axes.set_xlabel("along the seam [mm]")
@@ -345,7 +367,7 @@ def _along(
 
 def _refused(axes: Axes, findings: SeamFindings) -> None:
     """Why nothing in view is a seam, in place of a cross-section."""
-    listed = [textwrap.fill(f"{units.to_mm(r.length):.0f} mm long: {r.reason}", 62) for r in findings.rejected[:14]]
+    listed = [textwrap.fill(f"{units.to_mm(r.length):.0f} mm long: {r.reason}", REFUSED) for r in findings.rejected[:14]]
     axes.set_axis_off()
     axes.set_title("Candidates refused", loc="left", fontsize=13, color=INK)
     axes.text(0, 0.95, "\n".join(listed) or "There were none.", va="top", color=INK, fontsize=11, transform=axes.transAxes)

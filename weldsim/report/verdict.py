@@ -3,12 +3,14 @@
 from typing import Literal
 
 from weldsim import units
+from weldsim.counted import counted
 from weldsim.records import Pace, WeldReport
 from weldsim.report.limits import Check, ReportConfig, checks
 
 Look = Literal["good", "amber", "bad", "plain"]
 """How a headline is coloured."""
 
+PATH_FILE = "path file"  # the method of findings that a file told
 PASSED, AMBER, FAILED, STOPPED, UNJUDGED = "PASSED", "PASSED WITH WARNINGS", "FAILED", "STOPPED", "NOT JUDGED"
 LOOKS: dict[str, Look] = {PASSED: "good", AMBER: "amber", FAILED: "bad", STOPPED: "bad", UNJUDGED: "amber"}
 
@@ -29,8 +31,13 @@ def verdict(report: WeldReport, found: int, config: ReportConfig) -> tuple[str, 
         return f"{found} SEAM{'' if found == 1 else 'S'} FOUND", "no known seam to compare with"
     if report.warnings:
         others = len(report.warnings) - (0 < report.welded < report.seams)
-        return AMBER, part + kept + (f", {others} warning{'s'[: others > 1]}" if others else "")
+        return AMBER, part + kept + (f", {counted(others, 'warning')}" if others else "")
     return PASSED, part + kept
+
+
+def found_by(report: WeldReport) -> str:
+    """ "method profile", or that nothing was looked for."""
+    return "seams from a path file" if report.method == PATH_FILE else f"method {report.method}"
 
 
 def look(word: str) -> Look:

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.spatial import KDTree
 
+from weldsim.counted import counted
 from weldsim.errors import ViewError
 from weldsim.frames import Transform, matrix_from_rotation_vector, unit
 from weldsim.scan.config import ScanConfig
@@ -251,9 +252,10 @@ def _unseen(
     if not len(able):
         why = "no camera pose in range sees it unobstructed"
     elif reasons:
-        why = f"{len(reasons)} of {len(able)} poses that see it were tried: " + max(set(reasons), key=reasons.count)
+        tried = f"{len(reasons)} of {len(able)} camera poses that see it" if len(able) > 1 else "the one camera pose that sees it"
+        why = f"{tried} {'was' if len(reasons) == 1 else 'were'} tried: " + max(set(reasons), key=reasons.count)
     else:
-        why = f"more than {config.most} views would be needed, or views that bring less than {WORTH:.0%}"
+        why = f"more than {counted(config.most, 'view')} would be needed, or views that bring less than {WORTH:.0%}"
     return ViewError(
         f"scan: {1 - covered:.0%} of the groove's surroundings (limit {1 - config.coverage:.0%}) cannot be seen, most of it on the"
         f" part's {' '.join(names) or 'slanted'} side about ({middle[0]:.3f}, {middle[1]:.3f}, {middle[2]:.3f}) m in base: {why};"

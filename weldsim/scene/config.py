@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from weldsim.counted import counted
 from weldsim.errors import SceneError
 from weldsim.frames import Transform, matrix_from_rotation_vector
 from weldsim.quantity import REACH, SIZE, TURN, Metre, Radian, require_within
@@ -82,7 +83,7 @@ class FixtureConfig:
 
     def __post_init__(self) -> None:
         if self.clamps not in (0, 2, 4):
-            raise SceneError(f"fixture: {self.clamps} clamps; 0, 2 or 4 can be placed", key="clamps", limit=4)
+            raise SceneError(f"fixture: {counted(self.clamps, 'clamp')}; 0, 2 or 4 can be placed", key="clamps", limit=4)
         require_within(self, {"overlap": SIZE}, "fixture")
 
 

@@ -17,7 +17,7 @@ from weldsim.execution.contract import Clause
 from weldsim.output import write_whole
 from weldsim.records import KnownSeam, PointCloud, RobotFacts, SeamFindings
 from weldsim.report.html import write_html
-from weldsim.report.png import write_png
+from weldsim.report.png import png
 from weldsim.report.weld import report_json, versions
 from weldsim.run_folder import MANIFEST, SCHEMA, folder_in_place, log_bytes, write_json
 from weldsim.welding.job import Job, JobConfig, judged
@@ -50,7 +50,7 @@ def write_job(
 
     def fill(place: Path) -> None:
         resolved = {"cell": to_json(config), "scene": None if scene is None else to_json(scene), "job": job_json(job)}
-        write_json(place / "config.json", resolved)
+        write_json(place / "config.json", resolved, exact=True)
         shutil.copyfile(file, place / f"path{file.suffix.lower()}")
         write_json(place / "contract.json", contract_json(done.clauses, done.facts))
         if done.trial is not None:
@@ -62,8 +62,9 @@ def write_job(
             write_json(place / "report.json", report_json(done.report, limits))
             paths = tuple(done.path if i == job.seam else each for i, each in enumerate(program.paths))
             shown = {"log": done.log if job.arc else judged(done.log), "known": known or (), "welded": job.seam, "config": limits}
-            write_html(place / "report.html", done.report, cloud, findings, paths, **shown)
-            write_png(place / "report.png", done.report, cloud, findings, paths, **shown)
+            picture = png(done.report, cloud, findings, paths, **shown)
+            write_html(place / "report.html", done.report, cloud, findings, paths, still=picture, **shown)
+            write_whole(place / "report.png", picture)
         write_json(
             place / MANIFEST,
             {

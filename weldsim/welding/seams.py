@@ -12,6 +12,7 @@ from weldsim.dryrun.program import Program
 from weldsim.frames import unit
 from weldsim.path.files import read_path_json
 from weldsim.records import Joint, PointCloud, Reference, Seam, SeamFindings, TorchPath
+from weldsim.report.verdict import PATH_FILE
 
 APART = 1e-7  # [m] points nearer than this to the one before are one
 
@@ -25,7 +26,7 @@ def file_findings(program: Program, file: Path) -> tuple[SeamFindings, PointClou
     entries = read_path_json(file)["seams"] if program.kind == "path" else [{} for _ in program.paths]
     seams = tuple(_seam(entry, path) for entry, path in zip(entries, program.paths, strict=True))
     points = np.concatenate([seam.points_B for seam in seams])
-    findings = SeamFindings(seams=seams, region=np.zeros(len(points), np.int32), method="path file")
+    findings = SeamFindings(seams=seams, region=np.zeros(len(points), np.int32), method=PATH_FILE)
     return findings, PointCloud(points=points, frame="B")
 
 

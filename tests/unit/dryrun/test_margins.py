@@ -1,6 +1,7 @@
 """What a motion has to spare: figures known beforehand, shown where it would pass and nowhere else."""
 
 import json
+import re
 from dataclasses import replace
 
 import mujoco
@@ -73,13 +74,17 @@ def test_clearance_is_the_distance_of_the_nearest_bodies(passed: DryRun, cell: C
 
 
 def test_margins_are_told_where_a_motion_would_pass_alone(passed: DryRun, cell: Cell, tmp_path) -> None:
-    text = write_page(tmp_path / "page.html", passed, speed_limit=3.0).read_text()
+    text = write_page(tmp_path / "page.html", passed, (b"picture",), speed_limit=3.0).read_text()
     assert ">WOULD PASS</div>" in text
     assert "seam-1: would pass" in text
     assert "Clearance and margins" in text
-    drawn = json.loads(text[text.rindex("const FIGURES=") + 14 : text.rindex(";\nfor (const f of FIGURES)")])
+    drawn, _ = json.JSONDecoder().raw_decode(text, text.rindex("const FIGURES=") + 14)
     limits = [[shape["y0"] for shape in figure["layout"]["shapes"] if shape["type"] == "line"] for figure in drawn]
     assert limits == [pytest.approx([-360, 360]), pytest.approx([-np.rad2deg(3), np.rad2deg(3)])]
+    words = [[note["text"] for note in figure["layout"]["annotations"]] for figure in drawn]
+    assert words == [["limit +360 deg", "limit -360 deg"], ["limit +172 deg/s", "limit -172 deg/s"]]
+    (picture,) = re.findall("<img [^>]*>", text.split("<script>")[0])
+    assert 'alt="seam-1: the arm halfway"' in picture
     for figure, (low, high) in zip(drawn, limits, strict=True):
         seen = figure["layout"]["yaxis"]["range"]
         assert seen[0] < low < high < seen[1]

@@ -166,7 +166,7 @@ def test_a_script_is_read_in_the_order_in_which_it_moves(tmp_path, newline):
         ("p.json", "{", "is no JSON"),
         ("p.json", json.dumps({"schema": "other"}), "schema"),
         ("p.json", json.dumps({**_document(), "seams": []}), "nothing to check"),
-        ("p.json", json.dumps(_document(poses=_poses()[:1])), "1 poses; a path needs two"),
+        ("p.json", json.dumps(_document(poses=_poses()[:1])), "1 pose; a path needs two"),
         ("p.json", json.dumps(_document(poses=_poses(quaternion_wxyz=[0, 1.1, 0, 0]))), "quaternion length"),
         ("p.json", json.dumps(_document(poses=_poses(position=[float("nan"), 0, 0]))), "not finite"),
         (
@@ -175,7 +175,7 @@ def test_a_script_is_read_in_the_order_in_which_it_moves(tmp_path, newline):
             "millimetres",
         ),
         ("p.csv", "", "0 poses"),
-        ("p.csv", POSE, "1 poses; a path needs two"),
+        ("p.csv", POSE, "1 pose; a path needs two"),
         ("p.csv", f"{POSE}\n{POSE},1\n", "line 2: 7 columns"),
         ("p.csv", f"{POSE}\nnan,0,0,0,0,0\n", "line 2"),
         ("p.csv", f"{POSE}\n12.0,-450.0,100.0,3.1,0,0\n", "millimetres"),

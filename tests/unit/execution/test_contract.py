@@ -51,6 +51,13 @@ def test_our_own_arm_keeps_every_line() -> None:
     assert all(clause.passed for clause in contract(replace(FACTS, remote_control=True), STATE))
 
 
+def test_the_model_is_told_with_its_serial_number_where_the_arm_has_one() -> None:
+    """ "UR5 0" is no model: a number without a name, and the twin's arm has none."""
+    told = [contract(replace(FACTS, serial=serial), STATE)[0] for serial in ("2013350001", "")]
+    assert [clause.name for clause in told] == ["arm model", "arm model"]
+    assert [clause.value for clause in told] == ["UR5, serial number 2013350001", "UR5"]
+
+
 @pytest.mark.parametrize(
     ("change", "name", "advice"),
     [

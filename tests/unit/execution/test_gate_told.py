@@ -272,14 +272,14 @@ def test_a_defect_and_a_report_that_is_none_are_told() -> None:
     gate = ready(puppet)
 
     def no_report() -> RobotState:
-        raise RecordError("RobotState.q: 1 values are not finite")
+        raise RecordError("RobotState.q: 1 value is not finite")
 
     puppet.state = no_report  # type: ignore[method-assign]
     error = refused(gate)
-    assert str(error).startswith("stale state: RobotState.q: 1 values are not finite at 0.040 s")
+    assert str(error).startswith("stale state: RobotState.q: 1 value is not finite at 0.040 s")
     assert (error.data["rule"], error.data["what"], error.data["limit"]) == ("stale state", "report", 0.0)
     kinds = [(event.kind, event.text) for event in gate.events()]
-    assert kinds[1] == ("fault", "no report after the stop: RecordError: RobotState.q: 1 values are not finite")
+    assert kinds[1] == ("fault", "no report after the stop: RecordError: RobotState.q: 1 value is not finite")
 
 
 def test_the_events_of_a_stop_are_told_once_and_kept_in_the_black_box(tmp_path: Path) -> None:

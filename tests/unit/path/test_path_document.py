@@ -100,7 +100,7 @@ def test_seams_keep_their_numbers_and_those_without_a_path_their_reason() -> Non
         {"id": "seam-5", "length": 0.07, "reason": "too short"},
         {"id": "seam-7", "length": 0.07, "reason": "no path"},
     ]
-    with pytest.raises(InputError, match="1 seams and 2 torch paths") as caught:
+    with pytest.raises(InputError, match="1 seam and 2 torch paths") as caught:
         path_document((seam(),), (path(), path()), {}, {}, "")
     assert caught.value.data == {"seams": 1}
 
@@ -207,17 +207,17 @@ WRONG = [
     ("seams.0.speed", float("inf"), "speed inf"),
     ("seams.0.points", "missing", r"seams\[0\]\.points: must be a list of 3 numbers each"),
     ("seams.0.points", [[0.0, 0.0], [1.0, 0.0]], r"points: must be a list of 3 numbers each"),
-    ("seams.0.points", [[0.0, 0.0, 0.0]], r"seams\[0\]: 1 points; a seam needs two"),
+    ("seams.0.points", [[0.0, 0.0, 0.0]], r"seams\[0\]: 1 point; a seam needs two"),
     ("seams.0.points", [[0.0, 0.0, 0.0], [6.0, 0.0, 0.0]], r"points: spans 6 m \(limit 5 m\): looks like millimetres"),
     ("seams.0.sigma", [[0.0]], r"sigma: must be a list of numbers"),
-    ("seams.0.sigma", [0.0, float("nan")], r"sigma: 1 values are not finite"),
+    ("seams.0.sigma", [0.0, float("nan")], r"sigma: 1 value is not finite"),
     ("seams.0.sigma", 0.1, r"sigma: must be a list of numbers"),
     ("seams.0.sigma", ["little"], r"sigma: must be a list of numbers"),
     ("seams.0.gaps", [0.1, 0.2], r"gaps: must be a list of 2 numbers each"),
     ("seams.0.gaps", [[0.1, 0.2], [0.3]], r"gaps: must be a list of 2 numbers each"),
     ("seams.0.poses", {}, "poses is no list of objects"),
     ("seams.0.poses", [1, 2], "poses is no list of objects"),
-    ("seams.0.poses", poses(0.0), "1 poses; a path needs two"),
+    ("seams.0.poses", poses(0.0), "1 pose; a path needs two"),
     ("seams.0.poses.1.position", [0.0, 0.0], r"position: must be a list of 3 numbers each"),
     ("seams.0.poses.1.position", [0.0, 6.0, 0.0], r"position: spans 6\.5 m"),
     ("seams.0.poses.1.quaternion_wxyz", "missing", r"quaternion_wxyz: must be a list of 4 numbers each"),

@@ -18,7 +18,7 @@ from weldsim.report import figures
 from weldsim.report.html import write_html
 from weldsim.report.limits import ReportConfig
 from weldsim.report.plane import Seen, Unrolled, plane_of
-from weldsim.report.png import OBLIQUE, _oblique, _plan_view, _window, write_png
+from weldsim.report.png import OBLIQUE, _headline, _oblique, _plan_view, _window, write_png
 from weldsim.report.view import cross_section, error_lines, heights, shown, shows_surface, torch_axes, view_frame
 from weldsim.report.weld import weld_report
 
@@ -313,3 +313,18 @@ def test_a_floor_far_behind_does_not_push_the_part_into_a_corner() -> None:
     low, high = _window(part, [])
     assert (low < -0.2).all()
     assert (high > 0.2).all()
+
+
+def test_what_decided_the_verdict_stands_clear_of_the_facts() -> None:
+    """Both stand in one line under the headline, and either may be long."""
+    reason = "executed, cross-track mean 12.345 mm (limit <= 0.4 mm), and a clause that goes on for as long as it can in one line"
+    failed = replace(REPORT, passed=False, reasons=(reason,))
+    both = replace(FOUND, seams=(SEAM, SEAM))
+    for method, found in (("profile", FOUND), ("path file", both), ("a.long.module.of.my.own:and_a_function", both)):
+        figure = Figure(figsize=(16, 9), dpi=100)
+        FigureCanvasAgg(figure)
+        _headline(figure, replace(failed, method=method), found, 0, ReportConfig())
+        facts, why = [text for text in figure.texts if text.get_position()[1] == 0.905]
+        assert "seam" in facts.get_text()
+        assert why.get_text().startswith("executed")
+        assert not facts.get_window_extent().padded(10).overlaps(why.get_window_extent())

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from weldsim.columns import decode
+from weldsim.counted import counted
 from weldsim.errors import SceneError
 from weldsim.scene.workpieces.ply_faces import read_ply_mesh
 from weldsim.scene.workpieces.polygons import triangulated
@@ -162,7 +163,7 @@ def _read_binary_stl(content: bytes) -> tuple[Float[ndarray, "v 3"], Int[ndarray
     count = int.from_bytes(content[_STL_HEAD - 4 : _STL_HEAD], "little")
     held = (len(content) - _STL_HEAD) // _FACET.itemsize
     if count > held:
-        raise ValueError(f"its header promises {count} facets, the file holds {held}: cut off?")
+        raise ValueError(f"its header promises {counted(count, 'facet')}, the file holds {held}: cut off?")
     corners = np.frombuffer(content, _FACET, count, _STL_HEAD)["corners"].reshape(-1, 3).astype(float)
     return corners, np.arange(len(corners)).reshape(-1, 3)
 

@@ -23,6 +23,7 @@ from weldsim.columns import (
     plain_numbers,
     unit_of_comments,
 )
+from weldsim.counted import counted
 from weldsim.errors import SceneError
 
 COLUMNS = (*AXES, *NORMALS, "width")
@@ -124,8 +125,8 @@ def _columns(path: Path, table: TextTable, scale: float) -> tuple[dict[str, int]
     if table.names is None:
         if table.width not in UNNAMED:
             raise SceneError(
-                f"{path}, line {table.first + 1}: {table.width} columns; wanted are 3 (x y z), 4 (and width), 6 (x y z nx ny nz)"
-                " or 7",
+                f"{path}, line {table.first + 1}: {counted(table.width, 'column')}; wanted are 3 (x y z), 4 (and width),"
+                " 6 (x y z nx ny nz) or 7",
                 path=str(path),
                 allowed=tuple(UNNAMED),
             )
@@ -171,7 +172,9 @@ def _row(path: Path, number: int, line: str, table: TextTable, column: dict[str,
     if not line.strip() or is_comment(line) or not (cells := table.cells(line)):
         return None
     if len(cells) != table.width:
-        raise SceneError(f"{path}, line {number}: {len(cells)} columns, {table.width} before", path=str(path), line=number)
+        raise SceneError(
+            f"{path}, line {number}: {counted(len(cells), 'column')}, {table.width} before", path=str(path), line=number
+        )
     wanted = [cells[at] for at in column.values()]
     if not all(map(is_number, wanted)):
         raise SceneError(f"{path}, line {number}: {' '.join(cells)[:60]!r} are no numbers", path=str(path), line=number)

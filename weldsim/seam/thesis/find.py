@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from weldsim.counted import counted
 from weldsim.curves import arc_length
 from weldsim.errors import CloudError
 from weldsim.records import PointCloud, Rejection, Seam, SeamFindings, Threshold
@@ -29,11 +30,12 @@ def find_seams_thesis(cloud: PointCloud, config: ThesisConfig) -> SeamFindings:
     if cloud.frame != "B":
         raise CloudError(f"the cloud is in frame {cloud.frame}; the seam finder wants the robot base B", frame=cloud.frame)
     if len(cloud) < FEWEST_POINTS:
-        return _nothing(cloud, f"{len(cloud)} points; the method needs {FEWEST_POINTS}")
+        return _nothing(cloud, f"{counted(len(cloud), 'point')}; the method needs {FEWEST_POINTS}")
     points, cube, sight = reduce_cloud(cloud, config)
     if len(points) < FEWEST_POINTS:
         return _nothing(
-            cloud, f"{len(points)} points after the {config.voxel * 1e3:g} mm voxel grid; the method needs {FEWEST_POINTS}"
+            cloud,
+            f"{counted(len(points), 'point')} after the {config.voxel * 1e3:g} mm voxel grid; the method needs {FEWEST_POINTS}",
         )
     turned = normals.normals_towards(points, sight, config.normal_radius)
     gradient = descriptor.gradient(points, turned, config.descriptor_radius, config.descriptor)
@@ -54,7 +56,7 @@ def find_seams_thesis(cloud: PointCloud, config: ThesisConfig) -> SeamFindings:
         rejected.append(_reject(points, f"no point's descriptor is above {limit:.3g}"))
     elif sizes[0] < config.cluster_size:
         largest = points[groove[rank == 0]]
-        rejected.append(_reject(largest, f"largest cluster has {sizes[0]} points (limit {config.cluster_size})"))
+        rejected.append(_reject(largest, f"largest cluster has {counted(int(sizes[0]), 'point')} (limit {config.cluster_size})"))
     used = Threshold(
         name="gradient descriptor",
         value=limit,
@@ -86,13 +88,16 @@ def trace_seam(groove: Float[ndarray, "n 3"], sight: Float[ndarray, "n 3"] | Non
     edge = groove[boundary.boundary(groove, config.boundary_normal_radius, config.boundary_radius, config.boundary_angle)]
     raw = midpoints.midpoints(edge, config.partner_start, config.partner_limit, config.partner_angle)
     if len(raw) == 0:
-        return _reject(groove, f"none of {len(edge)} boundary points has a partner within {config.partner_limit * 1e3:g} mm")
+        return _reject(
+            groove, f"none of {counted(len(edge), 'boundary point')} has a partner within {config.partner_limit * 1e3:g} mm"
+        )
     knots = thin.thin(raw, config.thin_radius, config.thin_passes, config.thin_voxel)
     walk = order.walk_both_ways(knots, config.order_radius)
     line = knots[walk][config.end_cut : len(walk) - config.end_cut]
     if len(line) < 2:
         return _reject(
-            groove, f"{len(walk)} ordered path points; {2 * config.end_cut + 2} are needed to cut {config.end_cut} a side"
+            groove,
+            f"{counted(len(walk), 'ordered path point')}; {2 * config.end_cut + 2} are needed to cut {config.end_cut} a side",
         )
     outward = axes.plane_normals(line, groove, config.axis_radius)
     origin = None if sight is None else np.broadcast_to(sight.mean(axis=0), line.shape)
