@@ -57,6 +57,11 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: b
     return next((reason for k, (failed, reason) in enumerate(checks) if failed and k not in by_length), None)
 
 
+def sideless(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> bool:
+    """Whether the candidate has too little parent surface beside it, whatever else it is refused for."""
+    return supported(fit, span, config) < MIN_SUPPORT
+
+
 def doubt(standings: Sequence[Standing | None]) -> tuple[str, bool] | None:
     """Why the pieces of a seam may be waves of the surface, one clause, and whether it may be a groove all the same; or None.
 
