@@ -15,7 +15,7 @@ from weldsim import units
 from weldsim.cloud.config import CloudConfig
 from weldsim.errors import ConfigError
 from weldsim.execution.config import ExecutionConfig
-from weldsim.meant import choice_meant, in_table
+from weldsim.meant import choice_meant, in_table, list_meant
 from weldsim.motion.config import MotionConfig
 from weldsim.path.config import PathConfig
 from weldsim.report.limits import ReportConfig
@@ -192,6 +192,8 @@ def _structured(tables: Mapping[str, Any], cls: type[Config], where: str, given:
         elif key in (known := choices(cls)):
             choice = choice_meant(key.rpartition(".")[2], value_at(tables, key), known[key])
             more = f"did you mean {choice}?" if choice else ""
+        elif written := list_meant(value_at(tables, key)):
+            more = f"did you mean {written}?"
         elif "value" in error.data and not isinstance(value_at(tables, key), Mapping):
             more = _in_table(cls, key, value_at(tables, key), _source(key, given)[1])
         if not more:

@@ -15,6 +15,7 @@ from weldsim.curves import project
 from weldsim.errors import CloudError
 from weldsim.frames import unit
 from weldsim.records import PointCloud, Rejection, SeamFindings
+from weldsim.seam.config import ProfileConfig
 from weldsim.seam.find import find_seams
 from weldsim.search import CAMERA_FRAME, search
 
@@ -54,6 +55,8 @@ def hint(cloud: PointCloud, config: CellConfig, rejected: Sequence[Rejection] = 
     """
     if config.cloud.voxel > 0 and _finds(cloud, replace(config, cloud=replace(config.cloud, voxel=0.0))):
         return f"; without cloud.voxel = {config.cloud.voxel * 1e3:g} mm a seam is found: make it smaller, or leave it out"
+    if told := _of_limits(cloud, config):
+        return told
     told = "" if imaged else _of_viewpoint(cloud, config) if len(cloud.viewpoints) == 1 else _of_frame(cloud, config)
     return told or hint_of_sides(cloud, config, rejected) or _of_spacing(cloud)
 
@@ -81,6 +84,17 @@ def hint_of_sides(cloud: PointCloud, config: CellConfig, rejected: Sequence[Reje
             how = f"the surface beside it is then read out to {reach:.0f} mm from its middle, not {before:.0f} mm"
             return f"; a groove is found with {settings}: {how}"
     return ""
+
+
+def _of_limits(cloud: PointCloud, config: CellConfig) -> str:
+    """Which of the finder's settings, if any, keep a seam from being found that is found with their defaults."""
+    usual, own = ProfileConfig(), config.seam.profile
+    changed = [f"seam.profile.{name}" for name, value in vars(own).items() if value != getattr(usual, name)]
+    if config.seam.method != "profile" or not changed:
+        return ""
+    if not _finds(cloud, replace(config, seam=replace(config.seam, profile=usual))):
+        return ""
+    return f"; with the default{'' if len(changed) == 1 else 's'} of {' and '.join(changed)} a seam is found"
 
 
 def _of_viewpoint(cloud: PointCloud, config: CellConfig) -> str:

@@ -1,6 +1,7 @@
 """Which setting or choice is surely meant where a value is given that it cannot be; "" where none is."""
 
 import json
+import re
 from typing import Any
 
 from weldsim import units
@@ -23,6 +24,15 @@ def choice_meant(name: str, value: Any, known: tuple[Any, ...]) -> str:
         return "0"
     said = MEANT_VALUES.get(name, {}).get(word) or (units.known_unit(word, "m") if name == "units" else "")
     return said if said in written else word if word in written else nearest(word, written)
+
+
+def list_meant(value: Any) -> str:
+    """How a list is written of which the values were given alone, "0,0,10 mm" say; "" for what is none."""
+    parts = [part.strip() for part in value.split(",")] if isinstance(value, str) and "," in value else []
+    if len(parts) < 2 or not all(re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?( ?[a-z/^0-9]+)?", part, re.I) for part in parts):
+        return ""
+    plain = all(re.fullmatch(r"[-+.\de]+", part, re.I) for part in parts)
+    return f"[{','.join(parts if plain else map(json.dumps, parts))}]"
 
 
 def in_table(cls: type, table: str, value: Any, lead: str = "", *, quoted: bool = False) -> str:

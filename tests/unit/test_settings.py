@@ -247,6 +247,13 @@ def test_a_choice_that_is_meant_is_told_and_works(setting, meant, capsys):
     assert main(["config", "straight", "--set", f"{setting.partition('=')[0]}={meant}"]) == 0
 
 
+@pytest.mark.parametrize("text", ["0,-0.5,0", "0, -450 mm, 1e-2", "-.1 , 2.5cm, 0"])
+def test_a_list_without_brackets_is_told_with_them_and_works(text, capsys):
+    assert main(["config", "--set", f"cloud.crop_min={text}", "--set", "cloud.crop_max=[1,1,1]"]) == 2
+    meant = capsys.readouterr().err.partition("did you mean ")[2].partition("?")[0]
+    assert main(["config", "--set", f"cloud.crop_min={meant}", "--set", "cloud.crop_max=[1,1,1]"]) == 0
+
+
 def test_every_word_for_a_choice_is_for_one_that_there_is():
     known = {**choices(CellConfig), **choices(SceneConfig)}
     for name, words in MEANT_VALUES.items():

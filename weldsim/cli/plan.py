@@ -83,7 +83,7 @@ class Plan(ConfigOptions):
                 with clock.stage("report"):
                     self._write_report(page, picture, chosen, clock, config)
         if not result.findings.seams:
-            told = "; ".join((reasons_refused(result.findings), *result.notes))
+            told = "; ".join((reasons_refused(result.findings, config.seam.profile), *result.notes))
             raise NoSeamError(
                 f"{self.cloud}: no seam found; {told}{self._hint(config, result)}",
                 rejected=[asdict(refused) for refused in result.findings.rejected],

@@ -85,7 +85,11 @@ class Run(ConfigOptions):
             kept = write_run(folder, result, config, scene, self.seed, self.sensor)
         written = [folder, *([self.video] if self.video is not None and result.log is not None else [])]
         limits, found = limits_for(config, scene), result.plan.findings
-        unseen = () if found.seams else (f"no seam was found: {reasons_refused(found)}{self._hint(result, config)}",)
+        unseen = (
+            ()
+            if found.seams
+            else (f"no seam was found: {reasons_refused(found, config.seam.profile)}{self._hint(result, config)}",)
+        )
         if self.json:
             self._print_json(result.report, limits, written, kept)
         else:

@@ -194,7 +194,8 @@ def check_plannable(cloud: PointCloud) -> None:
             the figure.
     """
     if len(cloud) < MIN_POINTS:
-        raise CloudError(f"the cloud has {len(cloud)} points, planning needs {MIN_POINTS}", points=len(cloud), limit=MIN_POINTS)
+        number = f"{len(cloud)} point{'' if len(cloud) == 1 else 's'}"
+        raise CloudError(f"the cloud has {number}, planning needs {MIN_POINTS}", points=len(cloud), limit=MIN_POINTS)
     columns = cloud.points.T  # by column: reducing along axis 0 is slow
     span = max(float(column.max() - column.min()) for column in columns)
     if span < MIN_SPAN:

@@ -76,3 +76,21 @@ def test_no_settings_are_advised_where_they_find_nothing(tmp_path: Path, capsys)
     said = refused(capsys, tmp_path / "bare.ply", code=1)
     assert "on both sides" in said
     assert "a groove is found" not in said
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        (["min_length=1"], "no groove shows that is 1000 mm long"),
+        (["min_depth=20 mm"], "20 mm deep (seam.profile.min_depth)"),
+        (["max_width=10 mm", "min_length=40 mm"], "over the 10 mm of seam.profile.max_width"),
+    ],
+)
+def test_settings_that_keep_a_groove_from_being_found_are_told_and_without_them_it_is(settings, says, tmp_path, capsys) -> None:
+    write_cloud(tmp_path / "a.ply", groove_cloud(np.random.default_rng(0), noise="d415").cloud)
+    words = [word for text in settings for word in ("--set", f"seam.profile.{text}")]
+    said = refused(capsys, tmp_path / "a.ply", *words, code=1)
+    assert says in said
+    names = [f"seam.profile.{text.partition('=')[0]}" for text in settings]
+    assert set(re.search(r"with the defaults? of (.*) a seam is found", said)[1].split(" and ")) == set(names)  # type: ignore[index]
+    assert main(["plan", str(tmp_path / "a.ply")]) == 0

@@ -6,7 +6,7 @@ import shlex
 import pytest
 
 from weldsim.cli import main
-from weldsim.cli.options import EVERYTHING
+from weldsim.cli.options import EVERYTHING, ConfigOptions
 from weldsim.cli.usage import COMMANDS, MEANT_COMMANDS, MEANT_OPTIONS, SUFFIXES, overview, parse
 from weldsim.config import CellConfig
 from weldsim.errors import InputError, SceneError
@@ -163,6 +163,7 @@ def test_a_setting_that_is_an_option_and_an_option_that_is_a_setting_are_told(li
     command = parse([*kept, *shlex.split(told)])
     assert callable(command)
     if "--set" in told:
+        assert isinstance(command, ConfigOptions)
         assert command.cell() != CellConfig()
 
 

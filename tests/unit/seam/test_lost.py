@@ -1,6 +1,7 @@
 """Why a coarse line carries no groove: each cause has its own reason, with the figure and the limit that are true of it."""
 
 import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -67,7 +68,10 @@ def test_what_is_wrong_with_the_sides_is_told(beside: Parent, says: str) -> None
 
 
 def test_cross_sections_too_far_apart_are_told_with_their_setting() -> None:
-    refused = longest_refused(ProfileConfig(station_step=0.02), size=(0.16, 0.2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        longest_refused(ProfileConfig(station_step=0.02))
+        refused = longest_refused(ProfileConfig(station_step=0.02), size=(0.16, 0.2))
     told = re.search(r"(\d+) cross-sections along it at the 20 mm of seam.profile.station_step, under 12", refused.reason)
     assert told is not None
     assert int(told[1]) < 12
