@@ -15,17 +15,18 @@ from weldsim import units
 from weldsim.cloud.config import CloudConfig
 from weldsim.errors import ConfigError
 from weldsim.execution.config import ExecutionConfig
+from weldsim.meant import choice_meant, in_table, list_meant
 from weldsim.motion.config import MotionConfig
 from weldsim.path.config import PathConfig
 from weldsim.report.limits import ReportConfig
 from weldsim.scan.config import ScanConfig
 from weldsim.scene.miscalibration import TwinConfig
-from weldsim.schema import HIDDEN, describe, keys, structure, to_json
+from weldsim.schema import HIDDEN, choices, describe, keys, structure, to_json
 from weldsim.seam.config import SeamConfig
 from weldsim.sensor.d415 import D415Config, D435Config
 from weldsim.sensor.kinect import KinectConfig
 from weldsim.sensor.stereo_config import D415StereoConfig
-from weldsim.settings import DEFAULT, Given, Source, apply_overrides, load_toml, meant_keys, value_at, with_sources
+from weldsim.settings import DEFAULT, Given, Source, apply_overrides, load_toml, meant_keys, nearest, value_at, with_sources
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
@@ -183,33 +184,64 @@ def _structured(tables: Mapping[str, Any], cls: type[Config], where: str, given:
         key, limit = str(error.data.get("key", "")), error.data.get("limit")
         more = ""
         if "unknown" in error.data:
-            more = _meant(key, cls, given)
+            more = _meant(key, cls, given, value_at(tables, key))
         elif isinstance(limit, tuple) and "unit" in error.data:
             more = units.meant(value_at(tables, key), str(error.data["unit"]), *limit)
         elif isinstance(limit, tuple):
             more = units.meant_percent(value_at(tables, key), *limit)
+        elif key in (known := choices(cls)):
+            choice = choice_meant(key.rpartition(".")[2], value_at(tables, key), known[key])
+            more = f"did you mean {choice}?" if choice else ""
+        elif written := list_meant(value_at(tables, key)):
+            more = f"did you mean {written}?"
+        elif "value" in error.data and not isinstance(value_at(tables, key), Mapping):
+            more = _in_table(cls, key, value_at(tables, key), _source(key, given)[1])
         if not more:
             raise
         fault, mark, allowed = str(error).partition("; allowed")
         raise ConfigError(f"{fault.partition('; did you mean')[0]}; {more}{mark}{allowed}", **error.data) from None
 
 
-def _meant(key: str, cls: type, given: Given) -> str:
-    """Which setting is meant by the unknown `key`, of this kind of config or of the other; "" where none is near."""
+def _source(key: str, given: Given) -> tuple[str, Source]:
+    """The dotted key as it was written, of which `key` may be the beginning, and where it came from."""
+    return next(((k, v) for k, v in given.items() if k == key or k.startswith(f"{key}.")), (key, DEFAULT))
+
+
+def _in_table(cls: type, table: str, value: Any, source: Source) -> str:
+    """What is meant by a value in place of a table, written as where it came from takes it."""
+    lead = SCENE if cls is not CellConfig and source.kind == "command line" else ""
+    return in_table(cls, table, value, lead, quoted=source.kind != "command line")
+
+
+def _meant(key: str, cls: type, given: Given, value: Any) -> str:
+    """Which setting is meant by the unknown `key`, of this kind of config or of the other; "" where none is near.
+
+    Args:
+        value: that it was given.
+    """
     from weldsim.scene.config import SceneConfig
 
     lead = "" if cls is CellConfig else SCENE
-    written, source = next(((k, v) for k, v in given.items() if k == key or k.startswith(f"{key}.")), (key, DEFAULT))
+    written, source = _source(key, given)
     found = meant_keys(lead + written, [*keys(CellConfig), *(SCENE + one for one in keys(SceneConfig))])
+    if not found and "." not in written and not isinstance(value, Mapping):
+        for other in (cls, SceneConfig if cls is CellConfig else CellConfig):
+            if table := nearest(written, [one.partition(".")[0] for one in keys(other) if "." in one]):
+                own = other is cls or source.kind == "command line"
+                return _in_table(other, table, value, source) if own else f"{table} is {_home(cls)}"
     if not found:
         return ""
     if source.kind != "command line":
         found = [one for one in found if one.startswith(SCENE) is (cls is SceneConfig)] or found
         if found[0].startswith(SCENE) is not (cls is SceneConfig):
-            home = "a scene's: it belongs in the scene's file" if lead == "" else "the cell's: it belongs in a --config file"
-            return f"{found[0].removeprefix(SCENE)} is {home}"
+            return f"{found[0].removeprefix(SCENE)} is {_home(cls)}"
         found = [one.removeprefix(lead) for one in found]
     return f"did you mean {' or '.join(found[:MOST_MEANT])}?"
+
+
+def _home(cls: type) -> str:
+    """Where a setting belongs that is not of this kind of config but of the other."""
+    return "a scene's: it belongs in the scene's file" if cls is CellConfig else "the cell's: it belongs in a --config file"
 
 
 def digest(config: Any) -> str:

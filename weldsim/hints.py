@@ -1,5 +1,6 @@
 """What may keep a seam from being found, and what to do: each remedy was tried on the very cloud, and found one."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +11,11 @@ from scipy.spatial import KDTree
 from weldsim.cloud.files import check_plannable
 from weldsim.cloud.filters import prepare
 from weldsim.config import CellConfig
+from weldsim.curves import project
 from weldsim.errors import CloudError
 from weldsim.frames import unit
-from weldsim.records import PointCloud
+from weldsim.records import PointCloud, Rejection, SeamFindings
+from weldsim.seam.config import ProfileConfig
 from weldsim.seam.find import find_seams
 from weldsim.search import CAMERA_FRAME, search
 
@@ -24,6 +27,12 @@ FLATTEST = 0.25  # sine of the angle between sight and surface: flatter, it sees
 STAND_OFF = 0.45  # [m] of the viewpoint that is tried in place of one that cannot be
 AHEAD = 0.8  # cosine to the z axis, along which a camera looks in its own frame, of the way to the middle of its cloud
 FARTHEST = 2.0  # [m] from a camera at the origin to a cloud in its own frame
+NARROWER = (("max_width", "side_band"), ("side_band",))  # settings of the finder that are tried together on a narrow part
+NARROW = {
+    "max_width": 0.018,
+    "side_band": 0.010,
+}  # [m] what they are then; found at sweeps over land of 10 to 16 mm beside a groove
+SAME = 0.010  # [m] between the middle of a refused candidate and a seam that is the same
 OWN_FRAME = "; with --viewpoint 0 0 0 one is: the cloud looks like one in its camera's own frame, and so would be the path"
 
 
@@ -35,18 +44,57 @@ class _Plane:
     normal: Float[ndarray, "3"]
 
 
-def hint(cloud: PointCloud, config: CellConfig, *, imaged: bool = False) -> str:
+def hint(cloud: PointCloud, config: CellConfig, rejected: Sequence[Rejection] = (), *, imaged: bool = False) -> str:
     """What to do about a cloud in which no seam was found, one clause after `; `; empty where nothing that was tried helps.
 
     A viewpoint that may be right is never doubted: without it a groove's place is off by millimetres.
 
     Args:
-        cloud: as it was read, before `config.cloud` was applied.  imaged: whether from a depth image, whose viewpoint is right.
+        cloud: as it was read, before `config.cloud` was applied.  rejected: candidates that were refused in it.
+        imaged: whether from a depth image, whose viewpoint is right.
     """
     if config.cloud.voxel > 0 and _finds(cloud, replace(config, cloud=replace(config.cloud, voxel=0.0))):
         return f"; without cloud.voxel = {config.cloud.voxel * 1e3:g} mm a seam is found: make it smaller, or leave it out"
+    if told := _of_limits(cloud, config):
+        return told
     told = "" if imaged else _of_viewpoint(cloud, config) if len(cloud.viewpoints) == 1 else _of_frame(cloud, config)
-    return told or _of_spacing(cloud)
+    return told or hint_of_sides(cloud, config, rejected) or _of_spacing(cloud)
+
+
+def hint_of_sides(cloud: PointCloud, config: CellConfig, rejected: Sequence[Rejection]) -> str:
+    """With which settings a groove is found where a candidate was refused for the surface beside it: on a narrow part it is read
+    past the part's edges. One clause after `; `; empty where none that was tried helps.
+
+    Args:
+        cloud, rejected: as for `hint`.
+    """
+    profile = config.seam.profile
+    refused = [one.position_B for one in rejected if one.sideless and one.length >= profile.min_length]
+    if not refused or config.seam.method != "profile":
+        return ""
+    for names in NARROWER:
+        narrower = {name: NARROW[name] for name in names if NARROW[name] < getattr(profile, name)}
+        if len(narrower) < len(names) or narrower.get("max_width", profile.max_width) <= profile.min_width:
+            continue
+        found = _found(cloud, replace(config, seam=replace(config.seam, profile=replace(profile, **narrower))))
+        if found is not None and any(project(np.array(refused), seam.points_B)[0].min() < SAME for seam in found.seams):
+            settings = " ".join(f'--set seam.profile.{name}="{value * 1e3:g} mm"' for name, value in narrower.items())
+            then = replace(profile, **narrower)
+            reach, before = ((0.5 * each.max_width + each.side_band) * 1e3 for each in (then, profile))
+            how = f"the surface beside it is then read out to {reach:.0f} mm from its middle, not {before:.0f} mm"
+            return f"; a groove is found with {settings}: {how}"
+    return ""
+
+
+def _of_limits(cloud: PointCloud, config: CellConfig) -> str:
+    """Which of the finder's settings, if any, keep a seam from being found that is found with their defaults."""
+    usual, own = ProfileConfig(), config.seam.profile
+    changed = [f"seam.profile.{name}" for name, value in vars(own).items() if value != getattr(usual, name)]
+    if config.seam.method != "profile" or not changed:
+        return ""
+    if not _finds(cloud, replace(config, seam=replace(config.seam, profile=usual))):
+        return ""
+    return f"; with the default{'' if len(changed) == 1 else 's'} of {' and '.join(changed)} a seam is found"
 
 
 def _of_viewpoint(cloud: PointCloud, config: CellConfig) -> str:
@@ -135,9 +183,15 @@ def _plane(cloud: PointCloud) -> _Plane:
 
 def _finds(cloud: PointCloud, config: CellConfig) -> bool:
     """Whether a seam is found in the cloud as `weldsim plan` would look for it."""
+    found = _found(cloud, config)
+    return found is not None and bool(found.seams)
+
+
+def _found(cloud: PointCloud, config: CellConfig) -> SeamFindings | None:
+    """What `weldsim plan` would find in the cloud; None where it would not look."""
     try:
         cloud = prepare(cloud, config.cloud)
         check_plannable(cloud)
     except CloudError:
-        return False
-    return bool(search(cloud, lambda each: find_seams(each, config.seam))[1].seams)
+        return None
+    return search(cloud, lambda each: find_seams(each, config.seam))[1]

@@ -71,6 +71,23 @@ def keys(cls: type, prefix: str = "") -> list[str]:
     return found
 
 
+def choices(cls: type, prefix: str = "") -> dict[str, tuple[Any, ...]]:
+    """What each setting of `cls`, and of the tables inside it, may be, for those that have a few choices; by dotted key."""
+    found: dict[str, tuple[Any, ...]] = {}
+    hints = get_type_hints(cls, include_extras=True)
+    for entry in settings(cls):
+        parts = _parts(hints[entry.name])
+        inner = next((part for part in parts if isinstance(part, type) and is_dataclass(part)), None)
+        if any(get_origin(part) is tuple for part in parts):
+            continue
+        if inner is not None:
+            found |= choices(inner, f"{prefix}{entry.name}.")
+        own = next((get_args(part) for part in parts if get_origin(part) is Literal), (True, False) if bool in parts else ())
+        if own:
+            found[prefix + entry.name] = own
+    return found
+
+
 @dataclass(frozen=True, kw_only=True)
 class FieldDoc:
     """One line of help. Attributes: key (dotted), type, default and unit as text, doc (one paragraph)."""
@@ -143,6 +160,8 @@ def _type_name(hint: Any) -> str:
         return " | ".join(repr(choice) for choice in get_args(hint))
     if _is_union(hint):
         return " | ".join(_type_name(part) for part in get_args(hint))
+    if get_origin(hint) is tuple and is_dataclass(get_args(hint)[0]):
+        return "array of tables"
     if get_origin(hint) is tuple:
         return f"({', '.join('...' if part is Ellipsis else _type_name(part) for part in get_args(hint))})"
     if hint is type(None):
@@ -204,7 +223,7 @@ def _nearest(word: Any, allowed: Iterable[Any]) -> str:
 def _union(value: Any, hint: Any) -> Any:
     """`value` as the first member of the union that takes it."""
     members = get_args(hint)
-    if value is None and type(None) in members:
+    if type(None) in members and (value is None or (value == "none" and str not in members)):  # as `weldsim config` shows it
         return None
     members = [member for member in members if member is not type(None)]
     if len(members) == 1:

@@ -29,6 +29,35 @@ MEANT_NAMES = {
 }
 """What people say for the name of a setting, in a table that has it."""
 
+MEANT_VALUES = {
+    "method": {**dict.fromkeys(("ours", "default"), "profile"), **dict.fromkeys(("published", "paper"), "thesis")},
+    "workpiece": {
+        **dict.fromkeys(("groove", "grooved", "grooved_plate"), "groove_plate"),
+        **dict.fromkeys(("bare", "flat", "blank"), "plain_plate"),
+        **dict.fromkeys(("pipe", "tube"), "cylinder"),
+        **dict.fromkeys(("box", "block", "cube"), "cuboid"),
+        **dict.fromkeys(("branched", "branches", "fork"), "y"),
+        **dict.fromkeys(("stl", "cad", "file"), "mesh"),
+    },
+    "finish": {
+        **dict.fromkeys(("steel", "metal", "shiny", "bright", "polished"), "ground"),
+        **dict.fromkeys(("scale", "mill", "rolled"), "mill_scale"),
+        **dict.fromkeys(("dusted", "sprayed", "dull"), "matte"),
+        **dict.fromkeys(("dark",), "black"),
+    },
+    "shape": {
+        **dict.fromkeys(("line",), "straight"),
+        **dict.fromkeys(("curve", "curved", "circle"), "arc"),
+        **dict.fromkeys(("wave", "sine"), "s"),
+    },
+    "views": dict.fromkeys(("automatic", "planned"), "auto"),
+    "series": {**dict.fromkeys(("ur5", "cb"), "cb3"), **dict.fromkeys(("ur5e", "e-series", "eseries"), "e")},
+}
+"""What people say for a choice of a setting."""
+
+NOTHING = ("none", "no", "off", "nothing", "without")
+"""What people say where something is to be left out."""
+
 
 @dataclass(frozen=True)
 class Source:
@@ -140,6 +169,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return next(iter(difflib.get_close_matches(word, list(known), n=1, cutoff=ALIKE)), "")
 
 
+def named_like(word: str, known: Iterable[str]) -> list[str]:
+    """Those of the dotted keys whose last part `word` is a misspelling of: the nearest, in whatever tables it is."""
+    last = {one: one.rpartition(".")[2] for one in known}
+    name = nearest(word, dict.fromkeys(last.values()))
+    return [one for one, own in last.items() if own == name]
+
+
 def meant_keys(key: str, known: Iterable[str]) -> list[str]:
     """The dotted keys that may be meant where `key` is none: its tables left out or others before it, or misspelt."""
     known, parts = list(known), key.split(".")
@@ -162,7 +198,8 @@ def _alike(key: str, known: Iterable[str]) -> list[str]:
         likeness = [SequenceMatcher(None, *pair).ratio() for pair in ((name, its_name), (table, its_table)) if any(pair)]
         if min(likeness) >= ALIKE_PART:
             scored.append((sum(likeness), one))
-    return [max(scored)[1]] if scored else []
+    below = [one for one in known if table and one.startswith(f"{table}.")]
+    return [max(scored)[1]] if scored else named_like(name, below) or named_like(name, known)
 
 
 def _split(text: str) -> tuple[list[str], Any]:

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import replace
@@ -345,3 +346,16 @@ def test_a_root_given_as_opening_is_told_and_shuffled_points_are_refused(own_par
     error = capsys.readouterr().err
     assert "not in order along the seam: point " in error
     assert error.count("\n") == 1
+
+
+def test_a_narrow_part_is_told_with_settings_that_find_its_groove(tmp_path, monkeypatch, capsys):
+    """18 mm of plate beside the groove, on a table 20 mm below."""
+    monkeypatch.chdir(tmp_path)
+    words = ["run", "straight", "--set", "scene.plate.width=50 mm", "--set", "scene.fixture.clamps=0"]
+    assert main(words) == 1
+    out = capsys.readouterr().out
+    options = re.search(r"a groove is found with ((?:--set \S+=\"[^\"]+\" ?)+)", out.replace('":', '" '))
+    assert options is not None, out
+    main([*words, *shlex.split(options[1])])
+    assert "no seam was found" not in capsys.readouterr().out
+    assert json.loads((tmp_path / "runs" / "straight-0" / "report.json").read_text())["plan"]["mean"] < 0.4e-3

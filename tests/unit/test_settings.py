@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 from dataclasses import fields, replace
 from itertools import pairwise
 
@@ -12,8 +13,8 @@ from weldsim.config import SCENE, CellConfig, digest, for_scene, limits_for, loa
 from weldsim.errors import ConfigError, SceneError
 from weldsim.report.limits import ReportConfig
 from weldsim.scene.config import SceneConfig
-from weldsim.schema import keys
-from weldsim.settings import Source, load_toml, meant_keys, with_sources
+from weldsim.schema import choices, keys
+from weldsim.settings import MEANT_VALUES, Source, load_toml, meant_keys, with_sources
 from weldsim.units import parse
 
 GENERAL = ReportConfig()
@@ -181,6 +182,11 @@ def test_a_value_is_written_as_it_is_read(key):
         ("scene.pose.pitch=0.1", "scene.pose.tilt"),
         ("scene.pose.rotation=0.1", "scene.pose.yaw"),
         ("path.velocity=6 mm/s", "path.speed"),
+        ("seam.min_len=20 mm", "seam.profile.min_length"),
+        ("min_len=20 mm", "seam.profile.min_length"),
+        ("path.min_len=20 mm", "seam.profile.min_length"),
+        ("seam.profil.min_len=20 mm", "seam.profile.min_length"),
+        ("wdth=100 mm", "scene.plate.width or scene.cuboid.width or scene.groove.width"),
     ],
 )
 def test_an_unknown_setting_is_told_with_the_one_meant_and_that_one_works(setting, meant, capsys):
@@ -191,8 +197,94 @@ def test_an_unknown_setting_is_told_with_the_one_meant_and_that_one_works(settin
     assert sorted(told) == sorted(meant.split(" or "))
     value = setting.partition("=")[2]
     for key in told:
-        assert main(["config", "straight", "--set", f"{key}={value}"]) == 0
+        scene = "cuboid" if "cuboid" in key else "straight"
+        assert main(["config", scene, "--set", f"{key}={value}"]) == 0
         capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("setting", "meant"),
+    [
+        ("scene.fixture=none", "scene.fixture.clamps=0"),
+        ("scene.fixture=2", "scene.fixture.clamps=2"),
+        ("fixture=none", "scene.fixture.clamps=0"),
+        ("scene.material=steel", "scene.material.finish=ground"),
+        ("material=Black", "scene.material.finish=black"),
+        ("scene.centre_line=curve", "scene.centre_line.shape=arc"),
+        ("seam=thesis", "seam.method=thesis"),
+        ("seam=published", "seam.method=thesis"),
+        ("cloud.register=off", "cloud.register.enabled=false"),
+        ("execution.ur=ur5e", "execution.ur.series=e"),
+    ],
+)
+def test_a_value_in_place_of_a_table_is_told_with_its_setting_and_that_works(setting, meant, capsys):
+    assert main(["config", "straight", "--set", setting]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"did you mean {meant}?" in said
+    assert main(["config", "straight", "--given", "--set", meant]) == 0
+    key, value = meant.split("=")
+    assert re.search(rf"{re.escape(key)} +{value} ", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("setting", "meant"),
+    [
+        ("seam.method=published", "thesis"),
+        ("seam.method=THESIS", "thesis"),
+        ("scene.workpiece=box", "cuboid"),
+        ("scene.material.finish=shiny", "ground"),
+        ("scene.fixture.clamps=none", "0"),
+        ("scene.fixture.stand=off", "false"),
+        ("path.reverse=yes", "true"),
+        ("path.reverse=True", "true"),
+    ],
+)
+def test_a_choice_that_is_meant_is_told_and_works(setting, meant, capsys):
+    assert main(["config", "straight", "--set", setting]) == 2
+    said = capsys.readouterr().err
+    assert f"did you mean {meant}?" in said
+    assert main(["config", "straight", "--set", f"{setting.partition('=')[0]}={meant}"]) == 0
+
+
+@pytest.mark.parametrize("text", ["0,-0.5,0", "0, -450 mm, 1e-2", "-.1 , 2.5cm, 0"])
+def test_a_list_without_brackets_is_told_with_them_and_works(text, capsys):
+    assert main(["config", "--set", f"cloud.crop_min={text}", "--set", "cloud.crop_max=[1,1,1]"]) == 2
+    meant = capsys.readouterr().err.partition("did you mean ")[2].partition("?")[0]
+    assert main(["config", "--set", f"cloud.crop_min={meant}", "--set", "cloud.crop_max=[1,1,1]"]) == 0
+
+
+def test_every_word_for_a_choice_is_for_one_that_there_is():
+    known = {**choices(CellConfig), **choices(SceneConfig)}
+    for name, words in MEANT_VALUES.items():
+        own = {one for key, some in known.items() if key.rpartition(".")[2] == name for one in some}
+        assert own, name
+        assert set(words.values()) <= own
+        assert not set(words) & own
+
+
+def test_a_table_without_such_a_setting_is_told_with_those_it_holds(capsys):
+    assert main(["config", "straight", "--set", "scene.groove=10"]) == 2
+    assert "; scene.groove holds width, depth, angle, root_gap, misalignment, margin" in capsys.readouterr().err
+
+
+def test_in_a_file_what_is_meant_is_written_as_a_file_takes_it(tmp_path):
+    scene, cell = tmp_path / "part.toml", tmp_path / "cell.toml"
+    for file, load, text in ((scene, load_scene, 'fixture = "none"'), (cell, load_config, 'seam = "thesis"')):
+        file.write_text(f"{text}\n")
+        with pytest.raises(ConfigError, match="did you mean ") as caught:
+            load(file)
+        file.write_text(str(caught.value).partition("did you mean ")[2].partition("?")[0] + "\n")
+        load(file)
+    cell.write_text('fixture = "none"\n')
+    with pytest.raises(ConfigError, match="fixture is a scene's: it belongs in the scene's file"):
+        load_config(cell)
+
+
+def test_what_may_be_left_out_is_unset_as_it_is_shown():
+    assert load_scene("cuboid").limits.max is not None
+    assert load_scene("cuboid", ["limits.max=none"]).limits.max is None
+    assert load_scene("straight", ["limits.reason=none"]).limits.reason == "none"  # a text is kept
 
 
 def test_a_setting_in_the_wrong_file_is_told_where_it_belongs(tmp_path):

@@ -84,9 +84,9 @@ class Plan(ConfigOptions):
                 with clock.stage("report"):
                     self._write_report(page, picture, chosen, clock, config)
         if not result.findings.seams:
-            told = "; ".join((reasons_refused(result.findings), *result.notes))
+            told = "; ".join((reasons_refused(result.findings, config.seam.profile), *result.notes))
             raise NoSeamError(
-                f"{self.cloud}: no seam found; {told}{self._hint(config)}",
+                f"{self.cloud}: no seam found; {told}{self._hint(config, result)}",
                 rejected=[asdict(refused) for refused in result.findings.rejected],
             )
         document = self._document(chosen, numbers, clock)
@@ -125,11 +125,11 @@ class Plan(ConfigOptions):
                 f" weldsim scan {self.cloud} --out {self.cloud}.ply?"
             )
 
-    def _hint(self, config: "CellConfig") -> str:
+    def _hint(self, config: "CellConfig", result: "PlanResult") -> str:
         """What to do where no seam was found; empty where nothing that was tried helps."""
         from weldsim.hints import hint
 
-        return hint(self._read(config), config, imaged=self.intrinsics is not None)
+        return hint(self._read(config), config, result.findings.rejected, imaged=self.intrinsics is not None)
 
     def _report_files(self) -> tuple[Path | None, Path | None]:
         """HTML and PNG; None for what is not asked for. Raises OutputError for a name that is neither, nor a folder's."""

@@ -12,6 +12,7 @@ from weldsim.errors import InputError, SensorError
 from weldsim.sensor.names import SensorName
 
 if TYPE_CHECKING:
+    from weldsim.config import CellConfig
     from weldsim.jobs import RunResult
     from weldsim.records import WeldReport
     from weldsim.report.limits import ReportConfig
@@ -84,7 +85,11 @@ class Run(ConfigOptions):
             kept = write_run(folder, result, config, scene, self.seed, self.sensor)
         written = [folder, *([self.video] if self.video is not None and result.log is not None else [])]
         limits, found = limits_for(config, scene), result.plan.findings
-        unseen = () if found.seams else (f"no seam was found: {reasons_refused(found)}",)
+        unseen = (
+            ()
+            if found.seams
+            else (f"no seam was found: {reasons_refused(found, config.seam.profile)}{self._hint(result, config)}",)
+        )
         if self.json:
             self._print_json(result.report, limits, written, kept)
         else:
@@ -96,6 +101,14 @@ class Run(ConfigOptions):
             )
             print_written(written, kept)
         return 0 if result.report.passed else 1
+
+    def _hint(self, result: "RunResult", config: "CellConfig") -> str:
+        """With which settings a seam is found in the cloud; empty where none that was tried helps."""
+        from weldsim.cloud.config import CloudConfig
+        from weldsim.hints import hint_of_sides
+
+        plan = result.plan
+        return hint_of_sides(plan.cloud, replace(config, cloud=CloudConfig()), plan.findings.rejected)
 
     def _way_on(self, result: "RunResult", folder: Path) -> str:
         """How to go on with a weld that was stopped: the command that welds the rest of the planned path."""

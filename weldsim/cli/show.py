@@ -14,6 +14,7 @@ from weldsim.rounded import DECIMALS, rounded
 if TYPE_CHECKING:
     from weldsim.records import SeamFindings
     from weldsim.report.limits import Check
+    from weldsim.seam.config import ProfileConfig
 
 TOLD_REASONS = 3
 PATIENCE = 1.0  # [s] before progress is shown
@@ -36,11 +37,16 @@ def check_rows(checks: "Iterable[Check]") -> list[list[str]]:
     return [[c.figure, c.value, c.limit, "amber" if c.passed and c.amber else marks[c.passed]] for c in checks]
 
 
-def reasons_refused(findings: "SeamFindings") -> str:
-    """Why the longest candidates were refused, in one clause each."""
+def reasons_refused(findings: "SeamFindings", config: "ProfileConfig") -> str:
+    """Why the longest candidates were refused, in one clause each.
+
+    Args:
+        config: with which they were looked for.
+    """
     refused = sorted(findings.rejected, key=lambda rejection: -rejection.length)
     if not refused:
-        return "nothing in it looks like a groove"
+        length, depth = (f"{units.to_mm(value):g} mm" for value in (config.min_length, config.min_depth))
+        return f"no groove shows that is {length} long (seam.profile.min_length) and {depth} deep (seam.profile.min_depth)"
     told = "; ".join(f"{units.to_mm(one.length):.0f} mm long: {one.reason}" for one in refused[:TOLD_REASONS])
     more = len(refused) - TOLD_REASONS
     return f"refused {told}" + (f"; and {more} more" if more > 0 else "")

@@ -13,8 +13,9 @@ from typing import Any, Literal, get_args, get_origin
 import tyro
 
 from weldsim import units
+from weldsim.cli.meant import MEANT_CHOICES, MEANT_COMMANDS, MEANT_OPTIONS, SUFFIXES
 from weldsim.cli.quantities import QuantitySpec, gathered
-from weldsim.errors import InputError
+from weldsim.errors import InputError, WeldsimError
 from weldsim.settings import nearest
 
 Command = Callable[[], int]
@@ -65,65 +66,6 @@ COMMANDS: dict[str, Entry] = {
 }
 DESCRIPTION = "Simulation-first digital twin of a vision-guided arc-welding cell. `weldsim --version` prints the version."
 HELP = ("-h", "--help")
-
-MEANT_COMMANDS = {
-    **dict.fromkeys(("weld", "simulate", "sim", "twin", "demo", "start"), "run"),
-    **dict.fromkeys(("check", "verify", "validate", "dryrun", "dry", "reach"), "dry-run"),
-    **dict.fromkeys(("show", "draw", "view", "display", "picture"), "scenes show"),
-    **dict.fromkeys(("export", "mjcf"), "scenes export"),
-    **dict.fromkeys(("list", "ls", "parts", "workpieces"), "scenes"),
-    **dict.fromkeys(("settings", "set", "configure", "options"), "config"),
-    **dict.fromkeys(("find", "detect", "seam", "path"), "plan"),
-    **dict.fromkeys(("capture", "see", "look", "camera"), "scan"),
-    **dict.fromkeys(("robot", "send", "play"), "execute"),
-    **dict.fromkeys(("test", "compare", "bench", "benchmark", "regression"), "regress"),
-    **dict.fromkeys(("serve", "server", "ursim"), "controller"),
-    **dict.fromkeys(("fault",), "controller fault"),
-    **dict.fromkeys(("diagnose", "install", "info"), "doctor"),
-    **dict.fromkeys(("version", "v"), "--version"),
-}
-"""What people say for a command."""
-
-MEANT_OPTIONS = {
-    **dict.fromkeys(("output", "outfile", "output-dir", "out-dir", "folder", "dir", "o", "save"), ("out",)),
-    **dict.fromkeys(("camera",), ("sensor",)),
-    **dict.fromkeys(("finder", "algorithm"), ("method", "methods")),
-    **dict.fromkeys(("film", "movie", "mp4"), ("video",)),
-    **dict.fromkeys(("page",), ("report", "html")),
-    **dict.fromkeys(("unit",), ("units",)),
-    **dict.fromkeys(("settings", "setting", "param", "s"), ("set",)),
-    **dict.fromkeys(("file", "c", "cfg", "settings-file"), ("config",)),
-    **dict.fromkeys(("ip", "address", "robot-ip"), ("host",)),
-    **dict.fromkeys(("scale", "slow"), ("speed-scale",)),
-    **dict.fromkeys(("n", "count", "repeat"), ("seeds",)),
-    **dict.fromkeys(("j", "workers", "processes", "threads"), ("jobs",)),
-}
-"""What people say for an option."""
-
-MEANT_CHOICES = {
-    "robot": {
-        **dict.fromkeys(("simulated", "simulation", "simulator", "simulate", "twin", "mujoco", "virtual"), "sim"),
-        **dict.fromkeys(("real", "ur5", "ur5e", "ur_rtde", "rtde", "urx", "ursim", "cb3"), "ur"),
-    },
-    "sensor": {
-        **dict.fromkeys(("realsense", "depth"), "d415"),
-        **dict.fromkeys(("kinectv2", "kinect2", "kinect-v2"), "kinect"),
-        **dict.fromkeys(("ideal", "perfect", "true", "none"), "exact"),
-        **dict.fromkeys(("stereo", "d415_stereo"), "d415-stereo"),
-    },
-    "method": {**dict.fromkeys(("ours", "default"), "profile"), **dict.fromkeys(("published", "paper"), "thesis")},
-    "tool": {**dict.fromkeys(("tip", "wire", "tcp"), "torch"), **dict.fromkeys(("flange", "tool", "bare"), "tool0")},
-    "base": {**dict.fromkeys(("base", "ur"), "controller"), **dict.fromkeys(("ros", "urdf", "baselink"), "base_link")},
-    "profile": {**dict.fromkeys(("e-series", "eseries", "ur5e"), "e"), **dict.fromkeys(("ur5", "cb"), "cb3")},
-}
-"""What people say for a choice of an option."""
-
-SUFFIXES = {
-    "run": (".toml",),
-    "plan": (".ply", ".pcd", ".xyz", ".npz", ".npy"),
-    "dry-run": (".json", ".csv", ".script", ".urscript"),
-}
-"""What the files of a command end in."""
 
 _CHOICE = re.compile(r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)")
 _NUMBER = re.compile(r"error parsing (\S+): .*(?:int\(\)|float|INT|FLOAT).*(?:: '|\[')(.*)'")
@@ -243,12 +185,89 @@ def _check_setting(name: str, words: Sequence[str]) -> None:
     """
     key, rest = words[0], " ".join(takewhile(lambda word: not word.startswith("--"), words[1:4]))
     match = _VALUE.match(rest)
-    if match is None or ("=" in key and not key.endswith("=")):
+    if match is None or key.startswith("--") or ("=" in key and not key.endswith("=")):
         return
     unit = match[2] if units.is_unit(match[2]) else ""
     setting = f"{key.rstrip('= ')}={match[1]} {unit}".rstrip()
     said = f"--set {key} {match[0].strip() if unit else match[0].removesuffix(match[2]).strip()}"
     raise InputError(f"{said}: did you mean --set {shlex.quote(setting)}?; see weldsim {name} --help", words=[*words[:2]])
+
+
+def _check_option_set(name: str, command: Any, text: str, others: Sequence[str]) -> None:
+    """Raises InputError for an option that is given as a setting, `--set sensor=d435`, with the words that are meant.
+
+    Args:
+        text: behind `--set`.  others: the other words behind the command.
+    """
+    key, equals, value = (part.strip() for part in text.partition("="))
+    option = key.lower().replace("_", "-")
+    if not equals or "." in key or option == "set":
+        return
+    said, known, positional = f"--set {shlex.quote(text)}", _options(command), _options(command, positional=True)
+    if option in positional and _command_for(value) == name:
+        raise InputError(f"{said}: {option} goes without --set; did you mean weldsim {name} {value}?", words=[text])
+    for one in [option] if option in known else [one for one in MEANT_OPTIONS.get(option, ()) if one in known]:
+        for meant in ([f"--{one}", value], [f"--{one}"] if value.lower() in ("true", "yes", "on") else []):
+            if meant and _makes_command(name, [*_without_settings(others), *meant]):
+                raise InputError(f"{said}: did you mean {shlex.join(meant)}?; see weldsim {name} --help", words=[text])
+
+    if option not in known and (homes := [one for one, entry in COMMANDS.items() if option in _options(entry.load())]):
+        from weldsim.config import CellConfig, keys, meant_keys
+
+        tables = {one.partition(".")[0] for one in keys(CellConfig)}
+        of_option = any(value in _choices(home, f"--{option}") for home in homes)
+        if of_option or (key not in tables and not meant_keys(key, keys(CellConfig))):
+            have = f"weldsim {' and '.join(homes)} {'has' if len(homes) == 1 else 'have'} an option --{option}"
+            raise InputError(f"{said}: it is no setting; {have}", words=[text])
+
+
+def _without_settings(words: Sequence[str]) -> list[str]:
+    """The words without every `--set` and what it sets."""
+    return [word for before, word in zip(["", *words], words, strict=False) if "--set" not in (before, word)]
+
+
+def _makes_command(name: str, words: Sequence[str]) -> bool:
+    """Whether words make this command."""
+    try:
+        return callable(parse([name, *words]))
+    except InputError:
+        return False
+
+
+def _settings_meant(command: Any, option: str, words: Sequence[str]) -> list[str]:
+    """The settings of which an unknown option has the name, each as one would give it.
+
+    Args:
+        words: the option, and those behind it.
+    """
+    from weldsim.config import SCENE, CellConfig, keys, meant_keys
+    from weldsim.scene.config import SceneConfig
+
+    if "set" not in _options(command):
+        return []
+    known = [key for key in keys(CellConfig) if key.partition(".")[0] in command.reads]
+    if "scene" in _options(command, positional=True):
+        known += [SCENE + key for key in keys(SceneConfig)]
+    key = option.replace("-", "_")
+    found = [one for one in meant_keys(key, known) if f".{one}".endswith(f".{key}")]
+    _, equals, first = words[0].partition("=")
+    behind = list(words[1:]) if not equals else [first, *words[1:]]
+    value = [word for word in behind[:1] if not re.match(r"--?[A-Za-z]", word)]
+    value += [word for word in behind[1:2] if value and units.is_unit(word)]
+    given = " ".join(value) or "VALUE"
+    settings = [f"{one}={given}" for one in found]
+    return [f"--set {shlex.quote(text if _is_read(text) else f'{one}=VALUE')}" for one, text in zip(found, settings, strict=True)]
+
+
+def _is_read(setting: str) -> bool:
+    """Whether a setting of the cell, or of a scene, may have the value it is given."""
+    from weldsim.config import SCENE, load_config, load_scene
+
+    try:
+        load_scene("straight", [setting.removeprefix(SCENE)]) if setting.startswith(SCENE) else load_config(None, [setting])
+    except WeldsimError:
+        return False
+    return True
 
 
 def _values_after(option: str, words: Sequence[str]) -> list[str]:
@@ -321,6 +340,9 @@ def _check_options(name: str, command: Any, words: Sequence[str]) -> None:
         option = word.lstrip("-").partition("=")[0].replace("_", "-")
         if word == "--set" and words[index + 1 :]:
             _check_setting(name, words[index + 1 :])
+            _check_option_set(name, command, words[index + 1], [*words[:index], *words[index + 2 :]])
+        if word.startswith("--set="):
+            _check_option_set(name, command, word.removeprefix("--set="), [*words[:index], *words[index + 1 :]])
         if word.startswith("--") and option in lists:
             if option in given:  # the last would silently take the place of the others
                 raise InputError(f"--{option} is given twice; give its values together: --{option} A B", words=[word])
@@ -333,20 +355,21 @@ def _check_options(name: str, command: Any, words: Sequence[str]) -> None:
             value = words[index + 1 : index + 2]
             hint = f"it goes without one: weldsim {name} {' '.join(value) or option.upper()}"
             raise InputError(f"weldsim {name}: {option} is no option; {hint}; see weldsim {name} --help", words=[word])
-        guess = [f"--{one}" for one in _meant_options(option, known)]
+        guess = [f"--{one}" for one in _named_options(option, known)]
         others = [] if guess else [other for other, entry in COMMANDS.items() if option in _options(entry.load())]
+        guess = guess or _settings_meant(command, option, words[index:])
+        guess = guess or [f"--{one}" for one in filter(None, [nearest(option, sorted(known))]) if not others]
         hint = f"; did you mean {' or '.join(guess)}?" if guess else ""
-        hint = hint or (f"; weldsim {' and '.join(others)} {'has' if len(others) == 1 else 'have'}" if others else "")
+        hint += f"; weldsim {' and '.join(others)} {'has' if len(others) == 1 else 'have'}" if others else ""
         raise InputError(f"weldsim {name} has no option {word.partition('=')[0]}{hint}; see weldsim {name} --help", words=[word])
 
 
-def _meant_options(option: str, known: Iterable[str]) -> list[str]:
-    """Which of the known options is meant by an unknown one."""
+def _named_options(option: str, known: Iterable[str]) -> list[str]:
+    """Which of the known options is meant by another name for it."""
     known = sorted(known)
     if found := [one for one in MEANT_OPTIONS.get(option, ()) if one in known]:
         return found
-    plural = [one for one in known if one in (f"{option}s", option.removesuffix("s"))]
-    return plural or list(filter(None, [nearest(option, known)]))
+    return [one for one in known if one in (f"{option}s", option.removesuffix("s"))]
 
 
 def _options(command: Any, *, positional: bool = False) -> set[str]:

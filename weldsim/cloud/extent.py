@@ -119,9 +119,10 @@ def _units_of_part(span: float, spacing: float) -> list[str]:
 
 
 def _spacing(points: Float[ndarray, "n 3"]) -> float:
-    """Median distance from a point to its nearest neighbour [m]."""
+    """Median distance from a point to its nearest neighbour that lies elsewhere [m]: rounded numbers put many in one place."""
     from scipy.spatial import KDTree  # reading a good cloud never needs it
 
+    points = np.unique(points, axis=0)
     looks = points[:: max(1, len(points) // 2_000)]
     distance, _ = KDTree(points).query(looks, k=2)
     return max(float(np.median(distance[:, 1])), 1e-9)

@@ -176,12 +176,14 @@ class Rejection:
     Attributes:
         position_B: its middle [m].  length: its extent [m].  reason: one clause, with the figure and the limit.
         doubtful: it has a groove's shape, and waves of the surface that it may be one of.
+        sideless: what is wrong is the surface beside it, as where a part is narrow: at another level, or too little.
     """
 
     position_B: tuple[float, float, float]
     length: float
     reason: str
     doubtful: bool = False
+    sideless: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ import shlex
 import pytest
 
 from weldsim.cli import main
-from weldsim.cli.options import EVERYTHING
+from weldsim.cli.options import EVERYTHING, ConfigOptions
 from weldsim.cli.usage import COMMANDS, MEANT_COMMANDS, MEANT_OPTIONS, SUFFIXES, overview, parse
 from weldsim.config import CellConfig
 from weldsim.errors import InputError, SceneError
@@ -131,6 +131,47 @@ def test_a_setting_in_several_words_is_told_in_one_that_works(words, capsys):
 
 
 @pytest.mark.parametrize(
+    ("line", "meant"),
+    [
+        ("run straight --set sensor=d435", "--sensor d435"),
+        ("run straight --set=sensor=d435", "--sensor d435"),
+        ("run straight --set camera=d435", "--sensor d435"),
+        ("run straight --set seed=3 --set sensor=d435", "--seed 3"),
+        ("run straight --set seam=all", "--seam all"),
+        ("run straight --set method=thesis", "--method thesis"),
+        ("scan straight --set output=a.ply", "--out a.ply"),
+        ("plan a.ply --set 'viewpoint=0 0 1'", "--viewpoint '0 0 1'"),
+        ("regress --set seeds=3", "--seeds 3"),
+        ("execute a.json --set robot=sim", "--robot sim"),
+        ("execute a.json --robot sim --set speed_scale=0.5", "--speed-scale 0.5"),
+        ("execute a.json --robot sim --set arc=true", "--arc"),
+        ("run straight --speed 6 mm/s", "--set 'path.speed=6 mm/s'"),
+        ("run straight --path.speed=6mm/s", "--set path.speed=6mm/s"),
+        ("run straight --min_length 0.02", "--set seam.profile.min_length=0.02"),
+        ("plan a.ply --crop_min", "--set cloud.crop_min=VALUE"),
+    ],
+)
+def test_a_setting_that_is_an_option_and_an_option_that_is_a_setting_are_told(line, meant, capsys):
+    """The words that are told stand in place of those that were given, and make a command."""
+    words = shlex.split(line)
+    said = answer(words, capsys)
+    told = said.partition("did you mean ")[2].partition("?")[0].split(" or --set ")[0]
+    assert told == meant
+    if "VALUE" in meant:
+        return
+    kept = [word for word in words if word in (words[0], words[1], "--robot", "sim") and "=" not in word and word != "--set"]
+    command = parse([*kept, *shlex.split(told)])
+    assert callable(command)
+    if "--set" in told:
+        assert isinstance(command, ConfigOptions)
+        assert command.cell() != CellConfig()
+
+
+def test_a_scene_that_is_set_is_told_without(capsys):
+    assert "did you mean weldsim run curve?" in answer(["run", "straight", "--set", "scene=curve"], capsys)
+
+
+@pytest.mark.parametrize(
     ("line", "says"),
     [
         ("run straight --golden x", "weldsim regress has"),
@@ -140,6 +181,7 @@ def test_a_setting_in_several_words_is_told_in_one_that_works(words, capsys):
         ("plan --cloud a.ply", "weldsim plan a.ply"),
         ("run straight --set path.speed=6 mm/s", 'did you mean "path.speed=6 mm/s", in quotes?'),
         ("run straight curve", "curve: one word too many"),
+        ("regress --set --seeds 3", "--set: its value is missing"),
         ("plan a.ply --seam one", "--seam 'one' is neither a whole number nor all"),
         ("plan a.ply --near 0 -0.45", "--near 0 -0.45: 2 given, 3 needed"),
         ("plan a.ply --viewpoint --json", "--viewpoint: its 3 values are missing"),
@@ -196,8 +238,11 @@ def test_a_scene_file_without_its_suffix_is_told(tmp_path):
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("scenes show straight --set arm=ur10e", "unknown key 'arm'"),
-        ("scenes export straight --set arm=ur10e -o a.xml", "unknown key 'arm'"),
+        ("scenes show straight --set arm=ur10e", "it is no setting; weldsim dry-run has an option --arm"),
+        ("scenes export straight --set arm=ur10e -o a.xml", "it is no setting; weldsim dry-run has an option --arm"),
+        ("run straight --set viewpoint=1", "it is no setting; weldsim plan has an option --viewpoint"),
+        ("config --set sensor=d435", "it is no setting; weldsim run and scan and regress have an option --sensor"),
+        ("run straight --set frob=1", "unknown key 'frob'; allowed"),
         ("scenes export straight --set groove.width=10mm", "did you mean scene.groove.width?"),
         ("scenes show straight --set path.speed=0.01", "changes nothing here"),
         ("scenes show straight --set scene.cylinder.radius=100mm", "changes nothing here"),

@@ -60,6 +60,14 @@ def test_a_part_in_another_unit_is_told_that_unit_and_it_works(tmp_path: Path, u
     assert any(factor * scale == pytest.approx(1.0) for factor in factors)
 
 
+def test_a_part_in_whole_millimetres_is_told_its_unit_and_it_works(tmp_path: Path) -> None:
+    """Many of its points lie in one place: how far the next one is says nothing of how dense it is."""
+    np.save(tmp_path / "part.npy", np.round(plate(0.0004) * 1e3).astype(int))
+    with pytest.raises(CloudError, match="it looks like millimetres: pass --units mm"):
+        read_cloud(tmp_path / "part.npy")
+    check_plannable(read_cloud(tmp_path / "part.npy", unit="mm"))
+
+
 def test_stray_points_are_told_and_cropping_them_works(tmp_path: Path) -> None:
     np.save(tmp_path / "part.npy", np.vstack([plate(), [[40.0, 0, 0], [0, 900.0, 0]]]))
     with pytest.raises(CloudError, match=r"remove the stray ones \(--set cloud.crop_min"):

@@ -73,7 +73,10 @@ def test_pieces_of_one_seam_stand_out_together() -> None:
     one = Standing(ratio=2.0 + 0.8 * FOUND * np.sqrt(1.5), looks=4.0, spread=0.2, alike=2.0, elsewhere=900)
     assert doubt([one]) is not None
     assert doubt([one, one]) is None
-    assert doubt([None]) is not None, "what no chart shows is no groove"
+    unseen = doubt([None, None])
+    assert unseen is not None, "what no chart shows is no groove"
+    assert "too little of it shows together with 10 mm of surface" in unseen[0], "it was compared with nothing"
+    assert not unseen[1]
 
 
 def test_short_grooves_may_hardly_fade_on_the_way() -> None:

@@ -25,7 +25,8 @@ from weldsim.seam.profile.ends import seam_span, station_mask
 from weldsim.seam.profile.grid import ray_coordinates
 from weldsim.seam.profile.grow import grow, uncovered
 from weldsim.seam.profile.join import Piece, gaps, join_pieces
-from weldsim.seam.profile.judge import confidence, doubt, refusal
+from weldsim.seam.profile.judge import confidence, doubt, refusal, sideless
+from weldsim.seam.profile.lost import Lost
 from weldsim.seam.profile.rail import lay_out
 from weldsim.seam.profile.refine import Fit
 from weldsim.seam.profile.track import deepest
@@ -78,7 +79,8 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
         line, normals, level, more = waiting.pop(0)
         whole_line = more == MOST_REMAINDERS
         if level < MIN_LEVEL:
-            rejected.append(_rejection(line, f"surface at one level on both sides over only {level:.0%} of it"))
+            reason = f"surface at one level on both sides over only {level:.0%} of it, under {MIN_LEVEL:.0%}"
+            rejected.append(_rejection(line, reason, sideless=True))
             continue
         if any(_covers(piece, line) for piece in found):
             if more > 0:
@@ -88,9 +90,11 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
         if arc_length(line[own])[-1] >= 0.8 * config.min_length:
             line, normals = line[own], normals[own]
         fit = grow(atlas, line, normals, config)
-        reason = "no groove with its parent surface on both sides at one level could be followed along it"
-        if fit is not None:
+        if isinstance(fit, Lost):
+            reason, lacks_sides = fit.reason, fit.sides
+        else:
             span = seam_span(fit, config)
+            lacks_sides = sideless(fit, span, config)
             reason = refusal(fit, span, config)
             piece = Piece(fit, span, whole=reason is None)
             if reason is None or refusal(fit, span, config, piece=True) is None:
@@ -101,7 +105,7 @@ def _search(atlas: Atlas, coarse: list[CoarseLine], config: ProfileConfig) -> tu
                     left = uncovered(line, fit, span, 0.8 * config.min_length)
                     waiting += [(line[part], normals[part], level, more - 1) for part in left]
         if reason is not None and whole_line:
-            rejected.append(_rejection(line, reason))
+            rejected.append(_rejection(line, reason, sideless=lacks_sides))
     joined = join_pieces(found, atlas, config)
     whole = _without_doubles([piece for piece in joined if piece.whole], config)
     carried = _without_doubles([carry_on(piece, atlas, config) for piece in whole], config)
@@ -170,9 +174,10 @@ def _merit(course: Course, sure: float) -> float:
     return sure * course.length / (course.length + LONG)
 
 
-def _rejection(line: Float[ndarray, "k 3"], reason: str, doubtful: bool = False) -> Rejection:
+def _rejection(line: Float[ndarray, "k 3"], reason: str, doubtful: bool = False, *, sideless: bool = False) -> Rejection:
     x, y, z = line[len(line) // 2].tolist()
-    return Rejection(position_B=(x, y, z), length=float(arc_length(line)[-1]), reason=reason, doubtful=doubtful)
+    length = float(arc_length(line)[-1])
+    return Rejection(position_B=(x, y, z), length=length, reason=reason, doubtful=doubtful, sideless=sideless)
 
 
 def _covers(piece: Piece, line: Float[ndarray, "k 3"]) -> bool:

@@ -10,14 +10,15 @@ from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.atlas import SURROUNDINGS, Atlas
 from weldsim.seam.profile.ends import seam_span
 from weldsim.seam.profile.judge import refusal
+from weldsim.seam.profile.lost import Lost
 from weldsim.seam.profile.refine import Fit, refine, resume
 from weldsim.seam.profile.section import Section
 
 MOST_GROWTHS = 12  # times a fit is carried on with the points around it: a metre either way of where it began
 
 
-def grow(atlas: Atlas, line: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], config: ProfileConfig) -> Fit | None:
-    """The fit of a coarse line; carried on, with the points around, until the groove goes on no farther.
+def grow(atlas: Atlas, line: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3"], config: ProfileConfig) -> Fit | Lost:
+    """The fit of a coarse line; carried on, with the points around, until the groove goes on no farther. Or why there is none.
 
     Args:
         line: (k, 3) coarse centre line [m].  normals: (k, 3) unit, outward, of the surface around it.
@@ -25,7 +26,7 @@ def grow(atlas: Atlas, line: Float[ndarray, "k 3"], normals: Float[ndarray, "k 3
     picked = _gather(atlas, line, normals, config)
     fit = refine(line, unit(normals.mean(axis=0)), atlas.cloud.points[picked], atlas.sight_origins(picked), config)
     for _ in range(MOST_GROWTHS):
-        if fit is None or refusal(fit, seam_span(fit, config), config, piece=True) is not None:
+        if isinstance(fit, Lost) or refusal(fit, seam_span(fit, config), config, piece=True) is not None:
             return fit
         found = fit.rail.points[fit.core]
         beyond = max(np.linalg.norm(line - end, axis=1).min() for end in (found[0], found[-1]))

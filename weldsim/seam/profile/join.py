@@ -60,7 +60,9 @@ def piece_end(piece: Piece, way: int) -> End:
     skip = min(DISTURBED, 0.25 * place[-1])
     read = (place >= skip) & (place <= skip + END_REACH)
     # A parabola from the end inward, through what lies clear of a clamp's foot: that lifts the parent surface it stands on.
-    curve = np.polynomial.polynomial.polyfit(place[read], rail.points[index[read]], 2)
+    degree = min(2, max(1, int(np.count_nonzero(read)) - 1))  # two stations, as far apart as they may be set, carry a line alone
+    fitted = np.polynomial.polynomial.polyfit(place[read], rail.points[index[read]], degree)
+    curve = np.pad(fitted, ((0, 2 - degree), (0, 0)))
     sigma = float(fit.sigma[index].mean())
     turn = 4 * sigma / max(float(np.ptp(place[read])), rail.step)
     return End(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from weldsim.seam.config import ProfileConfig
-from weldsim.seam.profile.background import Standing
+from weldsim.seam.profile.background import SIDE, SIDE_HELD, Standing
 from weldsim.seam.profile.ends import station_mask, supported, trusted
 from weldsim.seam.profile.refine import BRIDGE, Fit
 
@@ -57,12 +57,20 @@ def refusal(fit: Fit, span: tuple[float, float], config: ProfileConfig, piece: b
     return next((reason for k, (failed, reason) in enumerate(checks) if failed and k not in by_length), None)
 
 
+def sideless(fit: Fit, span: tuple[float, float], config: ProfileConfig) -> bool:
+    """Whether the candidate has too little parent surface beside it, whatever else it is refused for."""
+    return supported(fit, span, config) < MIN_SUPPORT
+
+
 def doubt(standings: Sequence[Standing | None]) -> tuple[str, bool] | None:
     """Why the pieces of a seam may be waves of the surface, one clause, and whether it may be a groove all the same; or None.
 
     Args:
         standings: of its pieces; None where no chart shows one.
     """
+    if all(each is None for each in standings):
+        beside = f"{SIDE * SIDE_HELD * 1e3:.0f} mm of surface beyond its blurred lips on each side"
+        return f"too little of it shows together with {beside}, which tell a groove from waves of that surface", False
     over = score(standings)
     if over >= FOUND:
         if any(each.elsewhere > 0 or each.sighted for each in standings if each is not None):

@@ -10,6 +10,7 @@ from weldsim.seam.profile.rail import Rail, Strip
 
 CELL = 0.002  # [m] side of the cells that points are averaged in before fitting
 TOLERANCE = 0.003  # [m] a cell farther than this from the parent surface is never part of it
+LEAST_SUPPORT = 0.25  # share of a side's parent surface from which on a station has that side
 WINDOW = 0.020  # [m] along the seam, over which the two sides are compared
 STIFFNESSES = (0.02, 0.5, 10.0, 200.0, 4000.0)  # of the penalty on roughness, relative to the data between two knots
 FOLD = 0.030  # [m] along the seam, left out together to choose the stiffness

@@ -14,7 +14,8 @@ from weldsim.seam.config import ProfileConfig
 from weldsim.seam.profile.blocks import mean_blocks
 from weldsim.seam.profile.grid import Grid, make_grid
 from weldsim.seam.profile.lean import CERTAIN, Doubt, first_section, follow_section, settled_section
-from weldsim.seam.profile.parent import Parent, fit_parent
+from weldsim.seam.profile.lost import Lost, no_sides, not_followed, off_surface, short, too_few
+from weldsim.seam.profile.parent import LEAST_SUPPORT, Parent, fit_parent
 from weldsim.seam.profile.rail import Rail, Strip, lay_out, make_rail, shift_rail
 from weldsim.seam.profile.section import Section
 from weldsim.seam.profile.smooth import smooth
@@ -110,16 +111,16 @@ def refine(
     points: Float[ndarray, "n 3"],
     origins: Float[ndarray, "n 3"] | None,
     config: ProfileConfig,
-) -> Fit | None:
-    """The groove along a coarse line, or None where the data do not carry one.
+) -> Fit | Lost:
+    """The groove along a coarse line, or why the data do not carry one.
 
     Args:
         line: (k, 3) coarse centre line [m].  normal: outward, roughly.
         points: (n, 3) [m] near the line.  origins: (n, 3) viewpoints or None.
     """
     even = _eased(line, config)
-    if len(even) < 12:
-        return None
+    if len(even) < FEWEST_STATIONS:
+        return too_few(len(even), FEWEST_STATIONS, config)
     rail = make_rail(even, np.repeat(normal[None], len(even), 0), config.station_step, EXTEND)
     inner, outer = 0.5 * config.max_width, 0.5 * config.max_width + config.side_band
     around = Surroundings(points, origins)
@@ -127,19 +128,23 @@ def refine(
     strip = few.along(rail)
     parent = fit_parent(rail, strip, inner, outer)
     # Sides are at an angle, too, that are bent and seen from a slant; that is told when the rail stands upright.
-    if np.count_nonzero(sided(parent, config, most=STEEP)) * rail.step < 0.7 * config.min_length:
-        return None
+    band, level, least = (inner, outer), sided(parent, config, most=STEEP), 0.7 * config.min_length
+    if (length := np.count_nonzero(level) * rail.step) < least:
+        return no_sides(parent, config, band, short(length, least), STEEP)
+    away = off_surface(parent, band)
     rail = shift_rail(rail, np.zeros(len(rail)), parent.a, parent.b)
     strip = few.along(rail)
     parent = fit_parent(rail, strip, inner, outer)
-    if np.count_nonzero(sided(parent, config)) * rail.step < 0.7 * config.min_length:
-        return None
-    guess = _first_section(make_grid(rail, strip, parent, outer), sided(parent, config), attached(parent))
-    if guess is None:
-        return None
+    level = sided(parent, config)
+    if (length := np.count_nonzero(level) * rail.step) < least:
+        return away or no_sides(parent, config, band, short(length, least))
+    guess = _first_section(make_grid(rail, strip, parent, outer), level, attached(parent), config)
+    if isinstance(guess, Lost):
+        return away or guess
     section, offset, seen = guess
     rail = _advance(rail, parent, section, offset, seen)
-    return _settled(_measure(rail, section, around, config, "first"), around, config, BRIDGE)
+    fit = _settled(_measure(rail, section, around, config, "first"), around, config, BRIDGE)
+    return (away or fit) if isinstance(fit, Lost) else fit
 
 
 def resume(
@@ -159,45 +164,46 @@ def resume(
     """
     rail = make_rail(line, normals, config.station_step, EXTEND)
     around = Surroundings(points, origins)
-    return _settled(_measure(rail, section, around, config), around, config, bridge)
+    fit = _settled(_measure(rail, section, around, config), around, config, bridge)
+    return None if isinstance(fit, Lost) else fit
 
 
-def _settled(measured: "Measurement | None", around: Surroundings, config: ProfileConfig, bridge: float) -> Fit | None:
+def _settled(measured: "Measurement | Lost", around: Surroundings, config: ProfileConfig, bridge: float) -> Fit | Lost:
     """The fit once the rail has come to rest, and no groove is seen farther ahead."""
-    last: Measurement | None = None
     for _ in range(MOST_LOOKS):
         before = _at_rest(measured, around, config, bridge)
-        if before is None:
-            return None
-        measured = last = _farther(before, around, config, bridge)
-        if measured is None:
+        if isinstance(before, Lost):
+            return before
+        measured = _farther(before, around, config, bridge)
+        if isinstance(measured, Lost):
             return _concluded(before, bridge)
         if measured.reach(bridge) <= before.reach(bridge) + FEWEST_STATIONS:
             break
+    last = measured
     for _ in range(MOST_LOOKS - 1):
-        if last is None or not last.goes_on(bridge, 0.3 * LOOK_AHEAD):
+        if isinstance(last, Lost) or not last.goes_on(bridge, 0.3 * LOOK_AHEAD):
             break
         measured = _farther(last, around, config, bridge)
-        if measured is None:
+        if isinstance(measured, Lost):
             break
         last = measured
-    return None if last is None else _concluded(last, bridge)
+    return last if isinstance(last, Lost) else _concluded(last, bridge)
 
 
-def _farther(measured: "Measurement", around: Surroundings, config: ProfileConfig, bridge: float) -> "Measurement | None":
-    """The last, most careful measurement, along a rail that looks ahead at both ends; None where hardly any groove is seen."""
+def _farther(measured: "Measurement", around: Surroundings, config: ProfileConfig, bridge: float) -> "Measurement | Lost":
+    """The last, most careful measurement, along a rail that looks ahead at both ends; or why hardly any groove is seen."""
     return _measure(_next_rail(measured, bridge, LOOK_AHEAD), measured.section, around, config, "settled")
 
 
-def _at_rest(measured: "Measurement | None", around: Surroundings, config: ProfileConfig, bridge: float) -> "Measurement | None":
-    """The measurement after as many turns as the rail needs to come to rest and to stop growing; None where it is lost."""
+def _at_rest(measured: "Measurement | Lost", around: Surroundings, config: ProfileConfig, bridge: float) -> "Measurement | Lost":
+    """The measurement after as many turns as the rail needs to come to rest and to stop growing; or why it is lost."""
     for _ in range(MOST_TURNS - 1):
-        if measured is None:
-            return None
+        if isinstance(measured, Lost):
+            return measured
         before = measured
         extend = LOOK_AHEAD if before.goes_on(bridge) else EXTEND
         measured = _measure(_next_rail(before, bridge, extend), before.section, around, config)
-        if measured is not None and measured.settled and measured.reach(bridge) <= before.reach(bridge) + 2:
+        if isinstance(measured, Measurement) and measured.settled and measured.reach(bridge) <= before.reach(bridge) + 2:
             break
     return measured
 
@@ -250,8 +256,8 @@ class Measurement:
 
 def _measure(
     rail: Rail, start: Section, around: Surroundings, config: ProfileConfig, stage: Stage = "following"
-) -> Measurement | None:
-    """Parent surface, section and track along a rail, or None where hardly any groove is seen."""
+) -> Measurement | Lost:
+    """Parent surface, section and track along a rail, or why hardly any groove is seen."""
     strip = around.along(rail)
     blur = start.blur * WIDEST_FOOTPRINT
     inner = 0.5 * start.width + 0.7 * blur + 0.001
@@ -267,7 +273,10 @@ def _measure(
     track = follow(grid, section, flanked, attached(parent), generalised=stage == "settled")
     section = replace(section, middle=0.0)
     if np.count_nonzero(track.weight) < FEWEST_STATIONS:
-        return None
+        if (level := np.count_nonzero(flanked)) < FEWEST_STATIONS:
+            share = f"{level} of its cross-sections, under {FEWEST_STATIONS}"
+            return no_sides(parent, config, (inner, inner + config.side_band), share)
+        return not_followed(track, flanked, section.depth, FEWEST_STATIONS)
     offset, choice = smoothed(rail, track)
     return Measurement(rail, parent, grid, section, track, inner, offset, choice, doubt)
 
@@ -287,7 +296,7 @@ def _concluded(last: Measurement, bridge: float) -> Fit:
 def sided(parent: Parent, config: ProfileConfig, most: float | None = None) -> Bool[ndarray, "m"]:
     """Stations with parent surface on both sides, at one level and of one slope, within `most` [rad] if given."""
     level = (parent.step < config.max_side_step) & (parent.angle < (most or config.max_side_angle))
-    return level & (parent.support.min(axis=1) > 0.25)
+    return level & (parent.support.min(axis=1) > LEAST_SUPPORT)
 
 
 def attached(parent: Parent) -> Bool[ndarray, "m"]:
@@ -344,25 +353,25 @@ def pieces(seen: Bool[ndarray, "m"], step: float, bridge: float = BRIDGE) -> lis
 
 
 def _first_section(
-    grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"]
-) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | None:
-    """A first guess: each station's centroid, smoothed, and the mean profile's width and depth."""
+    grid: Grid, flanked: Bool[ndarray, "m"], held: Bool[ndarray, "m"], config: ProfileConfig
+) -> tuple[Section, Float[ndarray, "m"], Bool[ndarray, "m"]] | Lost:
+    """A first guess: each station's centroid, smoothed, and the mean profile's width and depth; or why there is none."""
     filled = np.maximum(grid.filled(), 0.0)
     smoothed = _evened(filled)
     middle = np.abs(grid.x) < 0.016
-    if np.count_nonzero(flanked) < 12:
-        return None
+    if (level := np.count_nonzero(flanked)) < FEWEST_STATIONS:
+        return too_few(int(level), FEWEST_STATIONS, config)
     depth = float(np.median(smoothed[flanked], axis=0)[middle].max(initial=0.0))
     if depth <= 0:
-        return None
+        return Lost("nothing in it lies below the surface beside it")
     filled = np.minimum(filled, 2.5 * depth)
     smoothed = np.minimum(smoothed, 2.5 * depth)
     window = smoothed * middle * (smoothed > 0.35 * depth)
     mass = window.sum(axis=1)
     groove = mass > 0.3 * np.median(mass[flanked])
     seen = groove & (flanked | (held & between(groove & flanked)))
-    if np.count_nonzero(seen) < 12:
-        return None
+    if (shown := np.count_nonzero(seen)) < FEWEST_STATIONS:
+        return Lost(f"a depth like that of the rest at {shown} of its cross-sections, under {FEWEST_STATIONS}")
     centroid = np.where(seen, (window @ grid.x) / np.maximum(mass, 1e-12), 0.0)
     offset = smooth(centroid[:, None], seen.astype(float), 1e4)[:, 0]
     shifted = np.stack([np.interp(grid.x, grid.x - o, row) for o, row in zip(offset[seen], filled[seen], strict=True)])
