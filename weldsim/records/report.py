@@ -78,6 +78,7 @@ class WeldReport:
         slowest, fastest: the stretch with the least and the greatest torch speed.  uneven: all that are off by more than told.
         interruptions: where the arc went out on the weld and where it was lit again, arc lengths [m].
         iou: overlap of the groove region found with the true one.
+        widths: between the lips [m], as found and as known.
         phantom_seams: seams found that are no seam.
         unplanned: seams found along which no path can be laid, a clause each.
         unjudged: figures that nothing is known to judge by, and why.
@@ -104,6 +105,7 @@ class WeldReport:
     uneven: tuple[Pace, ...] = ()
     interruptions: tuple[tuple[float, float], ...] = ()
     iou: float | None = None
+    widths: tuple[float, float] | None = None
     phantom_seams: int | None = None
     sigma_coverage: tuple[float, float] | None = None
     unplanned: tuple[str, ...] = ()

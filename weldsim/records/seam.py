@@ -258,6 +258,11 @@ class KnownSeam:
         check_increasing(self, "s", self.s)
 
     @property
+    def width(self) -> float:
+        """Mean distance between the lips [m]; 0 where only the middle is known."""
+        return float(np.linalg.norm(self.left_B - self.right_B, axis=1).mean())
+
+    @property
     def length(self) -> float:
         """Arc length of the opening [m]."""
         return float(self.s[-1] - self.s[0])

@@ -128,6 +128,9 @@ def _own_checks(report: WeldReport, config: ReportConfig) -> list[Check]:
         out.append(Check(figure="phantom seams", value=str(report.phantom_seams), limit=str(config.phantoms), passed=passed))
     if report.iou is not None:
         out.append(_shown(REGION, f"{report.iou:.3f}"))
+    if report.widths is not None:
+        found, known = (units.to_mm(width) for width in report.widths)
+        out.append(_shown("width of the opening", f"{found:.1f} mm, known {known:.1f} mm"))
     if report.sigma_coverage is not None:
         one, two = report.sigma_coverage
         out.append(_shown("errors within 1 and 2 sigma (normal: 68 %, 95 %)", f"{100 * one:.0f} %, {100 * two:.0f} %"))

@@ -159,6 +159,7 @@ def _against_known(
         report,
         plan=path_error(path, partner, seam, trims),
         executed=None if log is None else executed_error(log, partner, seam, trims),
+        widths=(seam.width, partner.width) if seam.width > 0 and partner.width > 0 else None,
         sigma_coverage=None if seam.sigma is None else sigma_coverage(seam.points_B, seam.sigma, partner, seam.reference),
     )
 

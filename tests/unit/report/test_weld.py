@@ -51,6 +51,16 @@ def test_a_good_weld_passes_and_says_by_how_much(seed: int) -> None:
     assert report.iou == 1.0
 
 
+def test_the_opening_found_is_told_beside_the_known_one() -> None:
+    known = sine_seam(np.random.default_rng(0))
+    report = job()
+    assert report.widths is not None
+    assert report.widths[1] == pytest.approx(float(np.linalg.norm(known.left_B[0] - known.right_B[0])), rel=1e-6)
+    (check,) = [check for check in checks(report, ReportConfig()) if check.figure == "width of the opening"]
+    assert check.value == f"{1e3 * report.widths[0]:.1f} mm, known {1e3 * report.widths[1]:.1f} mm"
+    assert check.passed is None
+
+
 FAULTS = {
     "plan, cross-track mean": {"offset": 6e-4},
     "executed tip from plan, p95": {"offset": -3e-4, "side": 6e-4},
