@@ -101,7 +101,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | N
     start = newline + (2 if data[newline : newline + 2] == b"\r\n" else 1)
     order, elements, viewpoints = "", [], None
     lines = data[:end].decode("latin1").splitlines()[1:]
-    unit = unit_of_comments([f"# {line}" for line in lines if line.startswith(("comment ", "obj_info "))])
+    unit = unit_of_comments([f"# {line.partition(' ')[2]}" for line in lines if line.startswith(("comment ", "obj_info "))])
     for line in lines:
         match line.split():
             case ["format", "ascii", _]:
