@@ -57,7 +57,7 @@ _SURVEY = {"easting": "x", "northing": "y", "elevation": "z", "altitude": "z", "
 _TRANSLATION = {"tx": "x", "ty": "y", "tz": "z"}
 _COLOUR_NAMES = {"r": "red", "g": "green", "b": "blue", "rf": "red", "gf": "green", "bf": "blue"}
 _OTHERS = re.compile(
-    "id|ids|index|idx|no|nr|number|num|row|intensity|reflectance|reflectivity|amplitude|scalar|label|class|classification|time|"
+    "id|ids|index|idx|no|nr|number|num|row|name|names|element|elements|intensity|reflectance|reflectivity|amplitude|scalar|label|class|classification|time|"
     "timestamp|stamp|gpstime|ring|depth|range|distance|confidence|snr|quality|curvature|alpha|a|i|s|return|returnnumber|count"
 )
 
