@@ -100,7 +100,8 @@ def _renamed(columns: Mapping[str, ndarray], unit: str | None) -> tuple[dict[str
     except ValueError:
         raise Unreadable(f"it has no x, y and z among {', '.join(columns) or 'its fields'}") from None
     units = {names[found[axis]].unit for axis in XYZ[0]}
-    said = next((name for name in METRES if units <= UNITS.keys() and {UNITS[each] for each in units} == {METRES[name]}), None)
+    scales = {UNITS.get(each or "") for each in units}
+    said = next((name for name in METRES if scales == {METRES[name]}), None)
     if units != {None} and said is None:
         raise Unreadable(
             f"its x, y and z ({', '.join(names[found[axis]].text for axis in XYZ[0])}) are not in one unit that is known"

@@ -108,13 +108,18 @@ def test_lists_that_belong_to_the_vertices_of_a_ply(read) -> None:
         np.testing.assert_array_equal(read(head(kind, *axes, listed) + after), POINTS)
         before = b"".join(struct.pack(f"{order}B2f3d", 2, 0, 1, *point) for point in POINTS)
         np.testing.assert_array_equal(read(head(kind, listed, *axes) + before), POINTS)
-        uneven = after[: -len(after) // 2] + struct.pack(f"{order}3dB", 0, 0, 0, 0) + after
-        with pytest.raises(CloudFileError, match="'tex' of its vertices have different lengths: export them without"):
-            read(head(kind, *axes, listed) + uneven)
+        lists = [[0.5] * (i % 4) for i in range(len(POINTS))]
+        uneven = [struct.pack(f"{order}2dB{len(t)}fd", x, y, len(t), *t, z) for (x, y, z), t in zip(POINTS, lists, strict=True)]
+        np.testing.assert_array_equal(read(head(kind, *axes[:2], listed, axes[2]) + b"".join(uneven)), POINTS)
+        with pytest.raises(CloudFileError, match="its header promises 150 points, the file holds 149: cut off"):
+            read(head(kind, *axes[:2], listed, axes[2]) + b"".join(uneven)[:-1])
     rows = "\n".join(f"{x} {y} {z} {i % 3} {'7 ' * (i % 3)}" for i, (x, y, z) in enumerate(POINTS))
     np.testing.assert_array_equal(read(head("ascii", *axes, listed) + rows.encode()), POINTS)
-    with pytest.raises(CloudFileError, match="a list before x, y and z: export them without"):
-        read(head("ascii", listed, *axes) + rows.encode())
+    first = [f"{i % 3} {'7 ' * (i % 3)}{x} {y} {z}" for i, (x, y, z) in enumerate(POINTS)]
+    np.testing.assert_array_equal(read(head("ascii", listed, *axes) + "\n".join(first).encode()), POINTS)
+    for damaged, words in (([*first[:-1], "2 7"], "its vertex 150 cannot be read"), (first[:-1], "the file holds 149")):
+        with pytest.raises(CloudFileError, match=words):
+            read(head("ascii", listed, *axes) + ("\n".join(damaged) + "\n" * 999).encode())
 
 
 @pytest.mark.parametrize(
