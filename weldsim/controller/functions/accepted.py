@@ -21,10 +21,10 @@ NOTHING = _words(
     modbus_add_rtu_signal modbus_delete_signal modbus_set_output_signal modbus_set_output_register
     modbus_set_signal_update_frequency modbus_set_signal_watchdog modbus_set_runstate_dependent_choice
     modbus_set_digital_input_action modbus_request_update_signal_value modbus_reset_connection modbus_send_custom_command
-    socket_close write_port_bit write_port_register reset_revolution_counter position_deviation_warning pause_on_error_code high_holding_torque_enable
-    high_holding_torque_disable path_offset_disable path_offset_set_alpha_filter path_offset_set_max_offset end_screw_driving
-    conveyor_pulse_decode set_conveyor_tick_count encoder_enable_pulse_decode encoder_enable_set_tick_count
-    encoder_set_tick_count stop_conveyor_tracking assert
+    socket_close write_port_bit write_port_register reset_revolution_counter position_deviation_warning pause_on_error_code
+    high_holding_torque_enable high_holding_torque_disable path_offset_disable path_offset_set_alpha_filter
+    path_offset_set_max_offset end_screw_driving conveyor_pulse_decode set_conveyor_tick_count encoder_enable_pulse_decode
+    encoder_enable_set_tick_count encoder_set_tick_count stop_conveyor_tracking assert
     """
 )
 """Do nothing."""
