@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy import ndarray
 
-PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int", "i2": "short"}
+PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int", "i2": "short", "u2": "ushort"}
 
 
 def ply_bytes(

@@ -1,6 +1,7 @@
 """Programs as PolyScope exports them, written anew for tests: what it puts at the head of a file and around its nodes."""
 
 HEAD_3 = """  modbus_add_signal("192.168.0.9", 255, 3, 0, "MODBUS_1", False)
+  modbus_add_rtu_signal("/dev/ttyTool", 1, 3, 0, "MODBUS_2")
   modbus_set_signal_update_frequency("MODBUS_1", 10)
   modbus_set_runstate_dependent_choice("MODBUS_1", 0)
   set_standard_analog_input_domain(0, 1)

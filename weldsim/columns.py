@@ -16,7 +16,8 @@ UNITS = {
     "cm": 1e-2, "centimeter": 1e-2, "centimeters": 1e-2, "centimetre": 1e-2, "centimetres": 1e-2,
     "mm": 1e-3, "millimeter": 1e-3, "millimeters": 1e-3, "millimetre": 1e-3, "millimetres": 1e-3,
     "um": 1e-6, "micron": 1e-6, "microns": 1e-6, "micrometer": 1e-6, "micrometre": 1e-6,
-    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "feet": 0.3048, "foot": 0.3048,
+    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "\"": 0.0254, "zoll": 0.0254,
+    "ft": 0.3048, "feet": 0.3048, "foot": 0.3048,
 }  # fmt: skip
 """Metres per unit of length, by the names that headers give it."""
 OTHER_UNITS = {"rad", "radian", "radians", "deg", "degree", "degrees", "\u00b0", "s", "sec", "ms", "m/s", "mm/s", "-", "1"}
@@ -29,6 +30,13 @@ _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _COMMENT = re.compile(r"\s*[\"']?(?:#|//|/\*|%|!|\*|--|REM\b|;(?!\s*[-+.\d]))", re.IGNORECASE)
 _TRAILING = re.compile(r"\s*(?:#|//|%|!).*$")
 _UNIT_SAID = re.compile(r"\bunits?\b(?:\s+(?:of\s+)?lengths?)?(?:\s*[:=\[(]|\s+is\b|\s+in\b)+\s*([A-Za-z]+)", re.IGNORECASE)
+_UNIT_MEANT = re.compile(
+    r"\b(?:coordinates?|values?|points?|positions?|lengths?|dimensions?|all)\b[\w ]*? in ([A-Za-z]+)\b", re.IGNORECASE
+)
+_UNIT_ALONE = re.compile(r"\W*([A-Za-z]+)\W*")
+_UNIT_TITLE = re.compile(
+    r"[\s\"']*(?:length[ _-]*|scale[ _-]*)?(?:units?|einheit(?:en)?)(?:\s+of\s+lengths?)?\b[\s\"']*[:=;,\t ]", re.IGNORECASE
+)
 _GROUPED = re.compile(
     r"(?:(?<=[;\t\"])|^)[ ]*[-+]?(?:(?P<point>\d{1,3}(?:\.\d{3})+,\d+)|(?P<comma>\d{1,3}(?:,\d{3})+\.\d+)"
     r"|(?P<blank>\d{1,3}(?:[\u00a0\u202f'\u2019]\d{3})+(?:[.,]\d+)?|\d{1,3}(?: \d{3})+[.,]\d+))[ ]*(?=[;\t\"]|$)",
@@ -49,7 +57,7 @@ _SURVEY = {"easting": "x", "northing": "y", "elevation": "z", "altitude": "z", "
 _TRANSLATION = {"tx": "x", "ty": "y", "tz": "z"}
 _COLOUR_NAMES = {"r": "red", "g": "green", "b": "blue", "rf": "red", "gf": "green", "bf": "blue"}
 _OTHERS = re.compile(
-    "id|ids|index|idx|no|nr|number|num|row|intensity|reflectance|reflectivity|amplitude|scalar|label|class|classification|time|"
+    "id|ids|index|idx|no|nr|number|num|row|name|names|element|elements|intensity|reflectance|reflectivity|amplitude|scalar|label|class|classification|time|"
     "timestamp|stamp|gpstime|ring|depth|range|distance|confidence|snr|quality|curvature|alpha|a|i|s|return|returnnumber|count"
 )
 
@@ -141,10 +149,21 @@ def plain_numbers(text: str) -> str:
 
 
 def unit_of_comments(lines: Sequence[str]) -> str | None:
-    """The unit of length that comments give, "units: mm" say; None where none does."""
-    found = (_UNIT_SAID.search(line) for line in lines if is_comment(line))
-    units = {match[1].lower() for match in found if match is not None and match[1].lower() in UNITS}
+    """The unit of length that comments or titles give, "units: mm" say; None where none does, or several do."""
+    units = {unit for line in lines if (unit := _unit_of_line(line)) is not None}
     return units.pop() if len(units) == 1 else None
+
+
+def _unit_of_line(line: str) -> str | None:
+    """The unit of length that a comment, or a title that begins with the word unit, gives."""
+    bare = _COMMENT.sub("", line, count=1) if is_comment(line) else line
+    found = []
+    if (title := _UNIT_TITLE.match(bare)) is not None and re.fullmatch(r"\s*in\W*", bare[title.end() - 1 :]) is None:
+        found.append(_UNIT_ALONE.fullmatch(bare[title.end() :]))
+    if bare is not line:
+        alone = _UNIT_ALONE.fullmatch(bare)
+        found += [_UNIT_SAID.search(bare), _UNIT_MEANT.search(bare), None if alone is None or alone[1] == "in" else alone]
+    return next((unit for match in found if match is not None and (unit := match[1].lower()) in UNITS), None)
 
 
 def is_comment(line: str) -> bool:

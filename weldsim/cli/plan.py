@@ -38,7 +38,7 @@ class Plan(ConfigOptions):
     viewpoint: Annotated[tuple[float, float, float] | None, quantities(POINT, "--viewpoint", words=3)] = None
     """Where the camera stood: metres, or each with its unit, "-750 mm" say; by default what the file says."""
 
-    units: Literal["m", "cm", "mm", "in"] | None = None
+    units: Literal["m", "cm", "mm", "um", "in", "ft"] | None = None
     """Unit of length of the cloud; by default the one that its columns' names give, else metres."""
 
     intrinsics: Path | None = None

@@ -34,10 +34,18 @@ _KNOWN = {
     "opencvpinhole", "pinhole", "pinholeradtan", "fullopencv", "polynomial", "standard", "perspective", "thinprism",
 }  # fmt: skip
 _FOCAL = {"flx": "fx", "fly": "fy"}  # of NeRF's tools
+_LENGTHS, _CENTRES = (
+    ("focallength", "focal", "focallengths"),
+    ("principalpoint", "opticalcenter", "opticalcentre", "center", "centre"),
+)
+_MATLAB = {"FocalLength", "PrincipalPoint", "IntrinsicMatrix", "RadialDistortion", "TangentialDistortion"}
+"""Names of MATLAB's cameraIntrinsics. Beside them ImageSize is rows and columns, and the first pixel's centre is (1, 1)."""
+_SAME = 1e-3  # [px] by which one figure, given twice, may differ
 _OF_CAMERA = {"fx", "fy", "cx", "cy", "width", "height", *_NAMED}
 _NONE = {"none", "null", "", "no", "0"}
 _STRANGE_IF_ZERO = re.compile("fisheye|equidistant|kannala|ftheta|omni|ucm|doublesphere|fov|spherical|mei")
-_SUSPECT = re.compile(r"dist(?!ance)|coeff?|^[kpst]\d{1,2}$|^xi$|^tau[xy]?$")
+_SUSPECT = re.compile(r"dist(?!ance)|coeff?|^kappa\d?$|^lambda\d?$|^[kpst]\d{1,2}$|^xi$|^tau[xy]?$")
+_DIVISION = re.compile(r"kappa\d?$|lambda\d?$")
 _COUNTS = (4, 5, 8, 12, 14)  # of coefficients
 _NO_LENS = re.compile("quat|orient|rot|pose|posit|transl|extrin|matrix|crop|range|fov|size|intrinsics|rect|bbox|time")
 _PASSED_OVER = ("roi", "header", "r", "projectionmatrix", "rectificationmatrix", "extrinsics", "regionofinterest")
@@ -46,10 +54,20 @@ _PASSED_OVER = ("roi", "header", "r", "projectionmatrix", "rectificationmatrix",
 def read_camera(table: dict[str, Any]) -> CameraIntrinsics:
     """The camera, distortion and all. Raises Unreadable, RecordError."""
     flat = _flattened(table)
+    matlab = _is_matlab(table)
+    if matlab and isinstance(size := flat.get("imagesize"), list):
+        flat["imagesize"] = size[::-1]
     fx, fy, cx, cy = _focal(flat, table)
+    cx, cy = (cx - 1.0, cy - 1.0) if matlab else (cx, cy)
     width, height = (_side(flat, name, table) for name in ("width", "height"))
     _check_pixels(flat, (width, height), (fx, fy), (cx, cy))
     return CameraIntrinsics.from_opencv(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, distortion=_distortion(flat))
+
+
+def _is_matlab(table: dict[str, Any]) -> bool:
+    """Whether a table, or one in it, has the names of MATLAB's cameraIntrinsics."""
+    inner = any(_is_matlab(value) for value in table.values() if isinstance(value, dict))
+    return inner or ("ImageSize" in table and not _MATLAB.isdisjoint(table))
 
 
 def _check_pixels(flat: dict[str, Any], size: tuple[int, int], focal: tuple[float, float], centre: tuple[float, float]) -> None:
@@ -142,17 +160,39 @@ def _focal(flat: dict[str, Any], table: dict[str, Any]) -> tuple[float, float, f
     if key is None and "fx" not in flat and np.size(flat.get("intrinsics", 0)) == 4:  # Kalibr
         fx, fy, cx, cy = numbers(flat, "intrinsics", (4,)).tolist()
         return fx, fy, cx, cy
+    named = _named_focal(flat)
     if key is None:
-        if "fx" not in flat:
-            raise Unreadable(f"key 'fx' is missing (found: {', '.join(map(str, table))[:80]})")
-        names = ("fx", "fy", "ppx" if "ppx" in flat else "cx", "ppy" if "ppy" in flat else "cy")
-        fx, fy, cx, cy = (float(numbers(flat, name, ())) for name in names)
-        return fx, fy, cx, cy
+        if named is None:
+            missing = next(name for name in ("fx", "fy", "cx", "cy") if name not in flat)
+            raise Unreadable(f"key {missing!r} is missing (found: {', '.join(map(str, table))[:80]})")
+        return named
     K = numbers(flat, key, (3, 3))
     K = K.T if (K[2] != [0, 0, 1]).any() and (K[:, 2] == [0, 0, 1]).all() else K  # Open3D writes it column by column
     if K[0, 1] != 0 or K[1, 0] != 0 or (K[2] != [0, 0, 1]).any():
         raise Unreadable("K is no matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
-    return float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2])
+    found = float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2])
+    if named is not None and np.abs(np.subtract(found, named)).max() > _SAME:
+        raise Unreadable(
+            f"{key}: it gives the focal lengths and the principal point twice, and differently: keep those of this image"
+        )
+    return found
+
+
+def _named_focal(flat: dict[str, Any]) -> tuple[float, float, float, float] | None:
+    """fx, fy, cx, cy from keys of their own, or from lists of the focal lengths and of the principal point; None without."""
+    if "skew" in flat and numbers(flat, "skew", ()) != 0:
+        raise Unreadable(f"skew {flat['skew']}: pixels aslant are not modelled; give a depth image without")
+    lengths = next((name for name in _LENGTHS if name in flat), None)
+    centre = next((name for name in _CENTRES if np.size(flat.get(name, 0)) == 2), None)
+    if lengths is not None and centre is not None and "fx" not in flat:
+        fx, fy = numbers(flat, lengths, (2,)) if np.size(flat[lengths]) > 1 else [float(numbers(flat, lengths, ()))] * 2
+        cx, cy = numbers(flat, centre, (2,))
+        return float(fx), float(fy), float(cx), float(cy)
+    names = ("fx", "fy", "ppx" if "ppx" in flat else "cx", "ppy" if "ppy" in flat else "cy")
+    if any(name not in flat for name in names):
+        return None
+    fx, fy, cx, cy = (float(numbers(flat, name, ())) for name in names)
+    return fx, fy, cx, cy
 
 
 def _side(flat: dict[str, Any], name: str, table: dict[str, Any]) -> int:
@@ -186,6 +226,8 @@ def _distortion(flat: dict[str, Any]) -> tuple[float, ...]:
     if any(named.values()):
         if coefficients is not None and np.any(coefficients):
             raise Unreadable("it gives the lens's coefficients twice, as a list and by name: keep one")
+        if named.get("k4") and not {"k5", "k6", "p1", "p2"} & named.keys() and model is None:
+            raise Unreadable("k1 to k4 without p1 and p2: of a fisheye lens, or rational? name the lens's model (distortion_model)")
         coefficients = [named.get(name, 0.0) for name in _ORDER]
         if named.get("t1") or named.get("t2"):
             raise Unreadable("t1, t2: a tilted sensor is not modelled; give a depth image without distortion")
@@ -218,6 +260,10 @@ def _refuse_unknown(flat: dict[str, Any]) -> None:
         if not _SUSPECT.search(key) and not _may_be_coefficients(key, value):
             continue
         if np.any(np.asarray(value, dtype=object) != 0):
+            if _DIVISION.match(key):
+                raise Unreadable(
+                    f"{key}: of a division model of the lens, which is not known; give a depth image without distortion"
+                )
             raise Unreadable(
                 f"{key}: may be a coefficient of the lens that is not known; call them D (k1 k2 p1 p2 k3), or leave the key out"
                 " where it is none"

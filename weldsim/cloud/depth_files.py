@@ -130,7 +130,8 @@ def _image(data: bytes, shape: tuple[int, int]) -> ndarray:
 def _check_size(found: tuple[int, ...], expected: tuple[int, int]) -> None:
     if found != expected:
         shown = " x ".join(map(str, found[::-1]))
-        raise Unreadable(f"the image is {shown} px, its intrinsics are for {expected[1]} x {expected[0]}")
+        turned = "; are width and height swapped there, rows first?" if found == expected[::-1] else ""
+        raise Unreadable(f"the image is {shown} px, its intrinsics are for {expected[1]} x {expected[0]}{turned}")
 
 
 def _png(data: bytes, shape: tuple[int, int]) -> ndarray:

@@ -6,20 +6,22 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from weldsim.cloud.raw import RawCloud
+from weldsim.cloud.raw import METRES, RawCloud
 from weldsim.counted import counted
 from weldsim.errors import CloudError
 from weldsim.records import MILLIMETRE_SPAN, PointCloud
 
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
-NAMES = {"mm": "millimetres", "cm": "centimetres", "in": "inches"}
+NAMES = {"m": "metres", "mm": "millimetres", "cm": "centimetres", "um": "micrometres", "in": "inches", "ft": "feet"}
+PROPOSED = ("mm", "cm", "in", "um")  # units that a cloud too wide in metres may be in
 MIN_SPAN = 0.005  # [m] a cloud smaller than this was scaled down twice, or shows no weld
 MAX_GRAIN = 0.0002  # [m] between neighbouring coordinates of a file in single precision
+WHOLE = 2.0**23  # from here on single precision holds whole numbers alone
 FARTHEST = 3.0  # [m] from the base to the nearest point of a cloud: no arm of a welding cell reaches so far
 FARTHEST_CAMERA = 5.0  # [m] from the cloud, or from the base with the cloud seen from there: depth cameras see no groove so far
 NEAREST_CAMERA = 0.25  # [m] from the base: nearer, the arm is in its way
 ROOM_SPACING = 0.05  # [m] between neighbouring points below which a scan of over 5 m may be one of a room, in metres
 USUAL_SPACING = 0.8e-3  # [m] between neighbouring points of scans of parts
+FEW = 3.0  # times the usual spacing above which whole numbers may be counts of a smaller unit
 LEAST_PART, MOST_PART = 0.02, MILLIMETRE_SPAN  # [m] span of what another unit must give to be proposed
 REACH = ((-1.5, -1.5, -0.5), (1.5, 1.5, 1.5))  # [m] corners of the box about the base that is proposed to crop to
 FEWEST_IN_REACH = 100  # points there for it to be proposed
@@ -29,7 +31,9 @@ def check_grain(path: str, points: Float[ndarray, "n 3"], scale: float) -> None:
     """Raises CloudError where single precision, so far from the origin, leaves less than the shape of a groove."""
     reach = float(np.abs(points).max())
     grain = float(np.spacing(np.float32(min(reach, 1e30)))) * scale
-    if grain > MAX_GRAIN and (points.astype(np.float32) == points).all():
+    if grain <= MAX_GRAIN or (reach < WHOLE and _are_whole(points)):
+        return
+    if (points.astype(np.float32) == points).all():
         raise CloudError(
             f"{path}: its single-precision coordinates reach {reach * scale:.3g} m, where they lie {grain * 1e3:.2g} mm apart"
             f" (limit {MAX_GRAIN * 1e3:g} mm): subtract the offset before saving, or save doubles",
@@ -37,6 +41,11 @@ def check_grain(path: str, points: Float[ndarray, "n 3"], scale: float) -> None:
             grain=grain,
             limit=MAX_GRAIN,
         )
+
+
+def _are_whole(points: Float[ndarray, "n 3"]) -> bool:
+    """Whether all coordinates are whole numbers, as counts of a sensor are."""
+    return bool((points == np.round(points)).all())
 
 
 def check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: int, raw: RawCloud) -> None:
@@ -53,7 +62,9 @@ def check_extent(path: str, points: Float[ndarray, "n 3"], unit: str, dropped: i
             f"{path}: spans {span:.4g} m read in {unit} (limit {MILLIMETRE_SPAN:g} m){left_out}; {advice}", path=path, span=span
         )
     if unit != "m" and 0 < span < MIN_SPAN:
-        advice = "its header names that unit: correct it" if raw.unit is not None else "it looks like metres: pass --units m"
+        meant = next((name for name in ("m", *PROPOSED) if LEAST_PART <= span / METRES[unit] * METRES[name] <= MOST_PART), "m")
+        advice = f"it looks like {NAMES[meant]}: pass --units {meant}"
+        advice = "its header names that unit: correct it" if raw.unit is not None else advice
         raise CloudError(
             f"{path}: spans {span * 1e3:.3g} mm read in {unit} (least {MIN_SPAN * 1e3:g} mm){left_out}; {advice}",
             path=path,
@@ -90,7 +101,15 @@ def _too_wide(points: Float[ndarray, "n 3"], unit: str, span: float, raw: RawClo
     if bulk <= MILLIMETRE_SPAN / 2:
         return f"96 % of the points lie within {bulk:.3g} m: remove the stray ones{_crop(points)}"
     spacing = _spacing(points)
-    if raw.unit is None and unit == "m" and (guesses := _units_of_part(span, spacing)):
+    guesses = _units_of_part(span, spacing) if unit == "m" else []
+    if raw.unit == "m" and guesses and spacing >= ROOM_SPACING:
+        return f"its header says metres, but it looks like {' or '.join(NAMES[guess] for guess in guesses)}: correct the header"
+    if raw.unit is None and guesses:
+        if METRES[guesses[0]] > MAX_GRAIN and spacing * METRES[guesses[0]] > FEW * USUAL_SPACING and _are_whole(points):
+            return (
+                "its coordinates are whole numbers, counts of a sensor perhaps: multiply them by the length of one count; as"
+                f" {NAMES[guesses[0]]} (--units {guesses[0]}) they are too coarse for the shape of a groove"
+            )
         if spacing < ROOM_SPACING:
             return f"crop it to the workpiece{_crop(points)}; or pass --units {guesses[0]} if its numbers are {NAMES[guesses[0]]}"
         if len(guesses) == 1:
@@ -111,7 +130,7 @@ def _crop(points: Float[ndarray, "n 3"]) -> str:
 def _units_of_part(span: float, spacing: float) -> list[str]:
     """The units in which points of this span and spacing, both read in metres, are most like the scan of a part, likeliest first:
     one, or centimetres and inches, which are too much alike for a guess."""
-    fits = [name for name in ("mm", "cm", "in") if LEAST_PART <= span * METRES[name] <= MOST_PART]
+    fits = [name for name in PROPOSED if LEAST_PART <= span * METRES[name] <= MOST_PART]
     if spacing < ROOM_SPACING:
         fits = [name for name in fits if spacing * METRES[name] > 0.1 * USUAL_SPACING]
     fits.sort(key=lambda name: abs(np.log(spacing * METRES[name] / USUAL_SPACING)))

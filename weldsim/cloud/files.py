@@ -16,13 +16,13 @@ from numpy import ndarray
 
 from weldsim.cloud.arrays import read_array_cloud
 from weldsim.cloud.depth_files import read_depth_frame, write_depth_png
-from weldsim.cloud.extent import METRES, MIN_SPAN, check_extent, check_grain, check_reach, check_viewpoints, cropped_to
+from weldsim.cloud.extent import MIN_SPAN, check_extent, check_grain, check_reach, check_viewpoints, cropped_to
 from weldsim.cloud.pcd import read_pcd
 from weldsim.cloud.ply import read_ply
 from weldsim.cloud.ptx import is_ptx, read_ptx
-from weldsim.cloud.raw import RawCloud, Unreadable
+from weldsim.cloud.raw import METRES, RawCloud, Unreadable
 from weldsim.cloud.sensor_frame import placed
-from weldsim.cloud.sources import read_bytes
+from weldsim.cloud.sources import read_bytes, unpacked
 from weldsim.cloud.table import read_text
 from weldsim.columns import decode, utf_16
 from weldsim.counted import counted
@@ -32,7 +32,7 @@ from weldsim.records import PointCloud
 
 __all__ = ["LengthUnit", "check_plannable", "read_cloud", "read_depth_frame", "write_cloud", "write_depth_png"]
 
-LengthUnit = Literal["m", "cm", "mm", "in"]
+LengthUnit = Literal["m", "cm", "mm", "um", "in", "ft"]
 _OTHERS = {
     b"LASF": "a LAS or LAZ file", b"ASTM-E57": "an E57 file", b"solid ": "an STL mesh", b"OFF": "an OFF mesh",
     b"glTF": "a glTF mesh", b"\x89HDF": "an HDF5 file, as Zivid's ZDF and MATLAB's are", b"MATLAB 5.0": "a MATLAB file",
@@ -55,8 +55,8 @@ def read_cloud(
     those at 0 0 0 where several are.
 
     Args:
-        path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, told apart by content. Points in the frame of a sensor whose pose the file
-            gives are moved by it; the cloud's `notes` say so.
+        path: PLY, PCD, XYZ/TXT/CSV, PTX, NPZ or NPY, gzip-compressed or not, told apart by content. Points in the frame
+            of a sensor whose pose the file gives are moved by it; the cloud's `notes` say so.
         unit: the file's unit of length; by default the one that its columns' names give, else metres.
         viewpoint: where the camera stood (3,) [m] in the same frame; it outranks what the file says.
         crop: lower and upper corner of the box that is kept [m]; by default everything is.
@@ -64,7 +64,7 @@ def read_cloud(
         CloudFileError: missing, unreadable, cut off, or no cloud.
         CloudError: no finite point, coordinates too coarse, an extent that shows that `unit` is wrong, or a camera too far away.
     """
-    data, given = read_bytes(path), _given(viewpoint)
+    data, given = unpacked(path, read_bytes(path)), _given(viewpoint)
     if utf_16(data) is not None:  # as spreadsheets save text
         data = decode(data).encode()
     try:
@@ -121,8 +121,6 @@ def _reader(data: bytes) -> Callable[[bytes], RawCloud]:
         return read_ply
     if data[:4] == b"\x89PNG":
         raise Unreadable("it is a PNG image; a depth image needs its intrinsics beside it (--intrinsics)")
-    if data[:2] == b"\x1f\x8b":
-        raise Unreadable("it is gzip-compressed; unpack it first")
     if data.startswith(b"version https://git-lfs"):
         raise Unreadable("it is a pointer of Git LFS, not the file itself: git lfs pull fetches it")
     if data[:2] == b"PK" and b"[Content_Types].xml" in data[:4096]:

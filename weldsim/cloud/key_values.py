@@ -33,6 +33,8 @@ def read_table(path: str | Path) -> dict[str, Any]:
             return parsed
         if isinstance(parsed, list):
             return {"matrix": parsed}
+    if text.lstrip("\ufeff \n\t").startswith("<"):
+        raise CloudFileError(f"{path}: is XML; give the same figures as JSON or YAML", path=str(path), reason="XML")
     raise CloudFileError(f"{path}: is neither JSON nor TOML nor lines of `key: value`", path=str(path), reason="no table")
 
 

@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.cloud.raw import RawCloud, Unreadable, check_count, from_columns
+from weldsim.cloud.raw import METRES, RawCloud, Unreadable, check_count, from_columns
 from weldsim.cloud.sensor_frame import rotation_of_quaternion
 from weldsim.cloud.table import parse_table
+from weldsim.columns import UNITS, unit_of_comments
 from weldsim.counted import counted
 
 _MAX_HEADER = 65_536
@@ -39,7 +40,10 @@ def read_pcd(data: bytes) -> RawCloud:
             raise Unreadable(f"its data is {' '.join(other)[:40]!r}, not ascii, binary or binary_compressed")
     fields = {name: column for name, column in fields.items() if column.ndim == 1}
     viewpoints, R = _pose(header)
-    return from_columns(fields | _unpacked_colours(fields), viewpoints=viewpoints, rotation=R)
+    comments = [line for line in data[:start].decode("latin1").split("\n") if line.startswith("#")]
+    said = unit_of_comments(comments)
+    unit = next((name for name in METRES if said is not None and METRES[name] == UNITS[said]), None)
+    return from_columns(fields | _unpacked_colours(fields), viewpoints=viewpoints, rotation=R, unit=unit)
 
 
 def _header(data: bytes) -> tuple[dict[str, list[str]], int]:

@@ -4,7 +4,7 @@ Own reader because the counts of a header must be checked against the file befor
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -101,7 +101,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], Float[ndarray, "k 3"] | N
     start = newline + (2 if data[newline : newline + 2] == b"\r\n" else 1)
     order, elements, viewpoints = "", [], None
     lines = data[:end].decode("latin1").splitlines()[1:]
-    unit = unit_of_comments([f"# {line}" for line in lines if line.startswith(("comment ", "obj_info "))])
+    unit = unit_of_comments([f"# {line.partition(' ')[2]}" for line in lines if line.startswith(("comment ", "obj_info "))])
     for line in lines:
         match line.split():
             case ["format", "ascii", _]:
@@ -143,9 +143,32 @@ def _ascii_columns(data: bytes, start: int, before: list[_Element], vertex: _Ele
                 raise Unreadable(f"it ends within its {element.name} elements")
     fixed = vertex.properties[: next((i for i, entry in enumerate(vertex.properties) if len(entry) == 3), None)]
     if len(fixed) < len(vertex.properties) and not {"x", "y", "z"} <= {entry[0] for entry in fixed}:
-        raise Unreadable("its vertices hold a list before x, y and z: export them without")
+        return _ascii_with_lists(data, start, vertex)
     table = parse_table(data[start:], columns=len(fixed), rows=vertex.count)
     return {entry[0]: _typed(table[:, i], entry[1]) for i, entry in enumerate(fixed)}
+
+
+def _ascii_with_lists(data: bytes, start: int, vertex: _Element) -> dict[str, ndarray]:
+    """Columns of vertices that hold lists before other properties: word by word. Raises Unreadable."""
+    lines = [line for line in data[start:].split(b"\n") if line.strip()][: vertex.count]
+    kept = [entry for entry in vertex.properties if len(entry) == 2]
+    rows = []
+    for number, line in enumerate(lines, 1):
+        words, at, row = line.split(), 0, []
+        try:
+            for entry in vertex.properties:
+                if len(entry) == 3:
+                    at += max(0, int(words[at]))
+                else:
+                    row.append(float(words[at]))
+                at += 1
+        except (ValueError, IndexError, OverflowError):
+            raise Unreadable(f"its vertex {number} cannot be read: {line[:40].decode('latin1')!r}") from None
+        rows.append(row)
+    if len(rows) < vertex.count:
+        raise Unreadable(f"its header promises {counted(vertex.count, 'point')}, the file holds {len(rows)}: cut off?")
+    table = np.array(rows, float).reshape(len(rows), len(kept))
+    return {entry[0]: _typed(table[:, i], entry[1]) for i, entry in enumerate(kept)}
 
 
 def _typed(column: ndarray, kind: str) -> ndarray:
@@ -159,14 +182,44 @@ def _binary_columns(data: bytes, start: int, before: list[_Element], vertex: _El
     for element in before:
         start = _skip(data, start, element, order)
     row = _row(data, start, vertex, order)
+    if vertex.has_list and not _are_alike(data, start, vertex.count, row):
+        return _binary_with_lists(data, start, vertex, order)
     if start + vertex.count * row.itemsize > len(data):
         held = max(0, len(data) - start) // max(1, row.itemsize)
         raise Unreadable(f"its header promises {counted(vertex.count, 'point')}, the file holds {held}: cut off?")
     table = np.frombuffer(data, row, vertex.count, start)
-    for name in row.names or ():
-        if name.startswith(_COUNT) and (table[name] != table[name][0]).any():
-            raise Unreadable(f"the lists {name.removeprefix(_COUNT)!r} of its vertices have different lengths: export them without")
     return {name: table[name] for name in row.names or () if not name.startswith(_COUNT) and table[name].ndim == 1}
+
+
+def _are_alike(data: bytes, start: int, count: int, row: np.dtype) -> bool:
+    """Whether the lists of all vertices are as long as those of the first."""
+    if start + count * row.itemsize > len(data):
+        return False
+    table = np.frombuffer(data, row, count, start)
+    return all((table[name] == table[name][0]).all() for name in row.names or () if name.startswith(_COUNT))
+
+
+def _binary_with_lists(data: bytes, start: int, vertex: _Element, order: str) -> dict[str, ndarray]:
+    """Columns of vertices whose lists have different lengths: the way to each is found vertex by vertex. Raises Unreadable."""
+    sizes = [[np.dtype(kind).itemsize for kind in entry[1:]] for entry in vertex.properties]
+    places = {entry[0]: np.empty(vertex.count, np.int64) for entry in vertex.properties if len(entry) == 2}
+    order_of_count: Literal["little", "big"] = "big" if order == ">" else "little"
+    at = start
+    for i in range(vertex.count):
+        for entry, size in zip(vertex.properties, sizes, strict=True):
+            if len(entry) == 2:
+                places[entry[0]][i] = at
+            else:
+                at += int.from_bytes(data[at : at + size[0]], order_of_count) * size[1]
+            at += size[0]
+        if at > len(data):
+            raise Unreadable(f"its header promises {counted(vertex.count, 'point')}, the file holds {i}: cut off?")
+    content = np.frombuffer(data, np.uint8)
+    kinds = {entry[0]: np.dtype(order + entry[1]) for entry in vertex.properties if len(entry) == 2}
+    return {
+        name: content[place[:, None] + np.arange(kinds[name].itemsize)].copy().view(kinds[name])[:, 0]
+        for name, place in places.items()
+    }
 
 
 def _row(data: bytes, start: int, vertex: _Element, order: str) -> np.dtype:

@@ -37,7 +37,27 @@ _OTHER_WAY = re.compile(
 )
 _HAND = "gripper|hand|flange|tool|tcp|ee"
 _OF_HAND = re.compile(f"cam(?:era)?(?:to|2|in)(?:{_HAND}|end)|(?:{_HAND})(?:t|to|2)?cam")
+_OF_CAMERA = re.compile("cam(?:era)?(?:opticalframe)?(?:to|2|in)(?:base|robot|world)$")  # which says of a name only what is wanted
+_LINK = re.compile(r"(?:^|[^a-z])cam(?:era)?\d?(?:_[a-z0-9]+)*_link(?![a-z])|cam(?:era)?link$")
+_BODY = re.compile(r"/?\w*(?:cam\w*_link|(?:colou?r|depth|infra\d?|rgb|left|right|ir)_frame)")
+_BASE_LINK = re.compile(r"/?(?:\w*/)?base_?link")
+_PARENTS = (
+    "frameid",
+    "parent",
+    "parentframe",
+    "parentframeid",
+    "robotbaseframe",
+    "baseframe",
+    "referenceframe",
+    "fixedframe",
+    "to",
+)
+_CHILDREN = ("childframeid", "child", "childframe", "trackingbaseframe", "cameraframe", "sensorframe", "from")
+_CAMERA_FRAME = re.compile(r"\w*(?:cam|optical)\w*")
+_HAND_FRAME = re.compile(r"(?:\w+_)?(?:tool|tool0|flange|gripper|hand|tcp|ee|eef|ee_link|end_effector|wrist_3_link)")
+_BASE_FRAME = re.compile(r"(?:\w+_)?(?:base|base_link|world|robot)")
 _PASSED_OVER = ("header", "stamp", "covariance", "version", "parameters", "uncertainty", "residuals")
+_UNIT_KEYS = ("unit", "units", "lengthunit", "translationunit", "positionunit")
 _UR_POSE = re.compile(r"\s*p\[([^\]]*)\]\s*")
 _MARKS = re.compile(r"[\[\](){},;]")
 
@@ -57,8 +77,10 @@ def _bare_numbers(text: str) -> Transform | None:
     if (found := _UR_POSE.fullmatch(text)) is not None:
         values = numbers({"p[...]": _MARKS.sub(" ", found[1]).split()}, "p[...]", (6,))
         return Transform.from_rotation_vector("BC", values[3:], values[:3])
-    lines = [_MARKS.sub(" ", line.partition("#")[0]).split() for line in text.split("\n")]
-    words = [word for line in lines for word in line]
+    lines = [line.partition("#")[0] for line in text.split("\n")]
+    words = re.split(r"[\s;]+", " ".join(lines).replace(",", ".").strip("\ufeff; "))  # with decimal commas, or none
+    if len(words) not in (12, 16) or not all(map(is_number, words)):
+        words = _MARKS.sub(" ", " ".join(lines)).split()
     if not words or not all(map(is_number, words)):
         return None
     if len(words) not in (12, 16):
@@ -70,7 +92,7 @@ def _pose(table: dict[str, Any]) -> Transform:
     """The pose in a table. Raises Unreadable."""
     leaves = list(_leaves(table, ""))
     _refuse_frames(table)
-    unit = next((str(value).strip().lower() for key, value in leaves if key in ("unit", "units", "lengthunit")), "m")
+    unit = next((str(value).strip().lower() for key, value in leaves if key in _UNIT_KEYS), "m")
     if unit not in UNITS:
         raise Unreadable(f"unit {unit[:20]!r}: lengths are in m, cm, mm or in")
     matrices = [(key, value) for key, value in leaves if _size(value) in (12, 16) and not _QUATERNIONS.fullmatch(key)]
@@ -79,6 +101,8 @@ def _pose(table: dict[str, Any]) -> Transform:
     position, rotation = _position(leaves, UNITS[unit]), _rotation(leaves)
     if not matrices:
         if position is None or rotation is None:
+            for name, _ in _words(table):
+                _refuse_name(plain(name), name)
             lacking = "position" if position is None else "rotation"
             raise Unreadable(f"it gives no {lacking} (found: {', '.join(map(str, table))[:80]}); wanted: {WANTED}")
         return Transform("BC", rotation, position)
@@ -115,7 +139,8 @@ def _leaves(node: dict[str, Any], parent: str) -> Iterator[tuple[str, Any]]:
                 f"rx{unit}, ry{unit}, rz{unit}: a rotation vector, or angles about three axes? give rotation_vector [rx, ry, rz] in"
                 " radians, or rpy"
             )
-    for key, value in rest.items():
+    for name, value in rest.items():
+        key = _OF_CAMERA.sub("", name) or name
         if key in _PASSED_OVER:
             continue
         if isinstance(value, dict):
@@ -137,14 +162,15 @@ def _size(value: Any) -> int:
 
 def _position(leaves: list[tuple[str, Any]], scale: float) -> Float[ndarray, "3"] | None:
     """The position [m]; None where there is none. Raises Unreadable."""
-    found = [(key, value, match) for key, value in leaves if (match := _POSITIONS.fullmatch(key)) is not None]
+    named = [(key, value, match) for key, value in leaves if (match := _POSITIONS.fullmatch(key)) is not None]
+    found = [entry for entry in named if _size(entry[1]) not in (12, 16)]  # t and p may be called matrices, too
     if not found:
         return None
     key, value, match = found[0]
     if len(found) > 1:
         raise Unreadable(f"it gives the position twice ({', '.join(name for name, _, _ in found)}): keep one")
-    named = match[1].removeprefix("in") if match[1] else None
-    return numbers({key: value}, key, (3,)) * (scale if named is None else UNITS[named])
+    unit = match[1].removeprefix("in") if match[1] else None
+    return numbers({key: value}, key, (3,)) * (scale if unit is None else UNITS[unit])
 
 
 def _rotation(leaves: list[tuple[str, Any]]) -> Float[ndarray, "3 3"] | None:
@@ -212,22 +238,38 @@ def _orthogonal(R: Float[ndarray, "3 3"], what: str) -> Float[ndarray, "3 3"]:
     return u @ vt
 
 
+_OF_BODY = "the x axis of that frame looks ahead; give the pose of the camera's optical frame"
+_OF_BASE_LINK = "half a turn about z from a UR controller's base; give the pose in the controller's, and call that frame base"
+
+
 def _refuse_name(key: str, name: str) -> None:
     """Raises Unreadable for a matrix that by its name is no pose of the camera in the base."""
     if _OF_HAND.search(key):
         raise Unreadable(f"{name}: is the camera's pose in the hand; its pose in the base is wanted, hand in base times this")
+    if _LINK.search(name.lower()):
+        raise Unreadable(f"{name}: {_OF_BODY}")
+    if re.search(r"base_?link", name.lower()):
+        raise Unreadable(f"{name}: {_OF_BASE_LINK}")
     if _OTHER_WAY.search(key):
         raise Unreadable(f"{name}: may lead from the base to the camera; give the camera's pose in the base, and call it matrix")
 
 
 def _refuse_frames(table: dict[str, Any]) -> None:
     """Raises Unreadable where frames are named, and they are not the optical frame of a camera in the robot's base."""
-    for name, value in _words(table):
-        key = plain(name)
-        if key in ("eyeonhand", "eyeinhand") and str(value).lower() == "true":
+    words = [(name, plain(name), str(value)) for name, value in _words(table)]
+    for name, key, value in words:
+        if key in ("eyeonhand", "eyeinhand") and value.lower() == "true":
             raise Unreadable("its camera is on the hand; its pose in the base is wanted: hand in base times this")
-        if key in ("childframeid", "trackingbaseframe", "cameraframe") and re.fullmatch(r"/?\w*cam\w*_link", str(value)):
-            raise Unreadable(f"it is the pose of {value}, whose x axis looks ahead; give that of the camera's optical frame")
+        frame = value.strip().lower().removeprefix("/")
+        parent, child = key in (*_PARENTS, "target"), key in (*_CHILDREN, "source")
+        if (parent and _CAMERA_FRAME.fullmatch(frame)) or (child and _BASE_FRAME.fullmatch(frame)):
+            raise Unreadable(f"{name} {value}: it leads from the base to the camera; the camera's pose in the base is wanted")
+        if (parent or child) and _HAND_FRAME.fullmatch(frame):
+            raise Unreadable(f"{name} {value}: it is a pose of or in the hand; that of the camera in the base is wanted")
+        if _BODY.fullmatch(frame):
+            raise Unreadable(f"it is the pose of {value}: {_OF_BODY}")
+        if parent and _BASE_LINK.fullmatch(frame):
+            raise Unreadable(f"{name} {value}: {_OF_BASE_LINK}")
 
 
 def _words(node: dict[str, Any]) -> Iterator[tuple[str, Any]]:

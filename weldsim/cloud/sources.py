@@ -1,5 +1,6 @@
 """The bytes of an input file, or the reason why there are none."""
 
+import zlib
 from pathlib import Path
 
 from weldsim.errors import CloudFileError
@@ -36,3 +37,24 @@ def read_bytes(path: str | Path) -> bytes:
         return where.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise refuse(f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
+
+
+def unpacked(path: str | Path, data: bytes) -> bytes:
+    """The content of gzip-compressed bytes; other bytes as they are.
+
+    Raises:
+        CloudFileError: damaged or cut off, or over 4 GB unpacked.
+    """
+    if data[:2] != b"\x1f\x8b":
+        return data
+    try:
+        unpacker = zlib.decompressobj(wbits=31)  # of a gzip header
+        content = unpacker.decompress(data, _MAX_BYTES)
+        whole, damage = unpacker.eof, ""
+    except zlib.error as error:
+        content, whole, damage = b"", False, f" ({error})"
+    if not whole or not content:
+        long = len(content) >= _MAX_BYTES
+        reason = f"has over {_MAX_BYTES} bytes unpacked; crop it first" if long else f"its gzip data is damaged or cut off{damage}"
+        raise CloudFileError(f"{path}: {reason}", path=str(path), reason=reason)
+    return content

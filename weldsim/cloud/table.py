@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from weldsim.cloud.raw import COLOURS, NORMALS, XYZ, RawCloud, Unreadable, check_count, from_columns, unit_colours
+from weldsim.cloud.raw import COLOURS, METRES, NORMALS, XYZ, RawCloud, Unreadable, check_count, from_columns, unit_colours
 from weldsim.columns import (
     HEADER_LINES,
     SAMPLE,
@@ -37,7 +37,7 @@ _EMPTY = re.compile(rb"(?:(?<=[,;\t])|^)[ ]*(?=[,;\t])|(?<=[,;\t])[ ]*$", re.MUL
 _BRACKETED = re.compile(rb"(?:[^\n]*\n)?\s*[\[({|]*\s*[-+.\d][^\n]*[\])}|]")
 _BETWEEN = re.compile(rb"[\])}][ \t]*,?\s*[\[({]")
 _BRACKETS = bytes.maketrans(b"[](){}|", b" " * 7)
-TAKEN = ("m", "cm", "mm", "in")  # units that read_cloud knows by these names
+TAKEN = tuple(METRES)  # units that read_cloud knows by these names
 
 
 def parse_table(
@@ -172,20 +172,22 @@ def _check_decimals(table: TextTable, rows: Sequence[str]) -> None:
 
 
 def _check_grid(points: Float[ndarray, "n k"], table: TextTable, rows: Sequence[str]) -> None:
-    """Raises Unreadable where two whole numbers stand before three others: row and column of a scan, and then x y z."""
-    cells = [row for row in map(table.cells, rows) if len(row) == table.width]
-    if table.width < 5 or len(points) < 100 or not (points[:, :2] == np.round(points[:, :2])).all():
+    """Raises Unreadable where one or two whole numbers stand before three others: a label or an intensity, or row and column
+    of a scan, and then x y z."""
+    cells = [row for row in map(table.cells, rows) if len(row) == table.width and all(map(is_number, row))]
+    if not cells or len(points) < 100:
         return
-    after = [row[2:5] for row in cells if all(map(is_number, row[:5]))]
-    if (
-        after
-        and all(any("." in row[i] for row in after) for i in range(3))
-        and not any("." in cell for row in cells for cell in row[:2])
-    ):
-        raise Unreadable(
-            "its first two columns are whole numbers and three others follow, row and column of a scan perhaps: name the columns in"
-            " a first line (row column x y z, say)"
-        )
+    broken = [any("." in row[i] for row in cells) for i in range(min(table.width, 5))]
+    for count, what in ((1, "column is"), (2, "two columns are")):
+        whole = not any(broken[:count]) and bool((points[:, :count] == np.round(points[:, :count])).all())
+        if count == 1 and counts(points[:, 0].tolist()):
+            continue  # told by itself
+        if whole and len(broken) >= count + 3 and all(broken[count : count + 3]):
+            named, meant = ("row column", "row and column of a scan") if count == 2 else ("label", "a label or an intensity")
+            raise Unreadable(
+                f"its first {what} whole numbers and three others follow, {meant} perhaps: name the columns in a first line"
+                f" ({named} x y z, say)"
+            )
 
 
 def _read(data: bytes, table: TextTable, columns: list[int]) -> Float[ndarray, "n k"]:

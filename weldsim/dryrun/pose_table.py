@@ -34,6 +34,7 @@ QUATERNION, ANGLES = ("qx", "qy", "qz", "qw"), ("roll", "pitch", "yaw")
 POSE = re.compile(r"\s*(?:(?:global\s+)?\w+\s*[=:]\s*)?\"?\s*p?\[+([^\[\]]*)\]+\s*\"?\s*[,;]?\s*")  # as programs write it
 ROTATION = re.compile(r"(?:r|rv|rot|rotvec|rotation|rotvector|rotationvector)[ _.:-]*([xyzw])")
 OF_QUATERNION = re.compile(r"(?:q|quat|quaternion|orientation|orient)[ _.:-]*([xyzw])")
+NUMBERED = {"q0": "qw", "q1": "qx", "q2": "qy", "q3": "qz"}
 WITHIN = re.compile(r"(?:field|pose|transform|msg)[ _.:-]+")  # what a message's columns begin with
 RECORDED = re.compile(r"(?:actual|target)_tcp_pose[ _.:-]?([0-5])")  # as ur_rtde and UR's own recorder call them
 OF_THE_TOOL = re.compile(r"(?:tcp|tool0|tool|tip|torch|flange|ee)[ _.:-]+")
@@ -208,27 +209,52 @@ def _columns(table: TextTable, lines: list[str], where: str) -> tuple[list[_Colu
         return [_Column(what, i, said if what in AXES else 1.0) for i, what in enumerate(WANTED)], None
     if table.doubled:
         raise InputError(f"{where}: twice as many columns as names: decimal commas need ; between the columns", path=where)
-    found: dict[str, int] = {}
+    named: dict[str, list[int]] = {}
+    bare = [_bare(name) for name in table.names]
+    counted_from_0 = NUMBERED.keys() <= set(bare)
     turned = any(match[1] == "w" for name in table.names if (match := ROTATION.fullmatch(_inner(name))) is not None)
     for i, name in enumerate(table.names):
-        if (wanted := _wanted(name, turned)) is None:
-            continue
-        if wanted in found and name.text.lower() != wanted:
-            continue  # x is called just so by one column, and somehow like it by another
-        found[wanted] = i
+        wanted = NUMBERED.get(bare[i]) if counted_from_0 else None
+        if (wanted := wanted or _wanted(name, turned)) is not None:
+            named.setdefault(wanted, []).append(i)
+    # x may be called just so by one column, and somehow like it by others
+    exact = {wanted: [i for i in at if bare[i] == wanted] for wanted, at in named.items()}
+    found = {wanted: (exact[wanted] or at)[0] for wanted, at in named.items()}
     rotation = next((kind for kind in (WANTED[3:], QUATERNION, ANGLES) if all(name in found for name in kind)), WANTED[3:])
     if missing := [name for name in (*AXES, *rotation) if name not in found]:
         listed = ", ".join(name.text for name in table.names if name.text)[:120]
         joints = sum(JOINT.fullmatch(_bare(name)) is not None for name in table.names) >= len(WANTED)
         hint = "these are joint angles: movej in a .script takes them; " if joints else ""
+        hint = hint or _other_rotation(set(bare))
         raise InputError(
             f"{where}: column {missing[0]} is missing among {listed}; {hint}x y z rx ry rz [m, rad] are needed, or"
             " qx qy qz qw or roll pitch yaw for the rotation",
             path=where,
         )
+    for name in (*AXES, *rotation):
+        if len(either := exact[name] or named[name]) > 1:
+            both = " and ".join(table.names[i].text for i in either[:2])
+            wanted = " ".join((*AXES, *rotation))
+            raise InputError(
+                f"{where}: two of its columns may be {name}: {both}; call those that are meant {wanted}, or leave the others out",
+                path=where,
+            )
     columns = [_Column(name, found[name], _scale(name, table, found, lines, where)) for name in (*AXES, *rotation)]
     label = next((i for i, name in enumerate(table.names) if name.text.lower() in ("seam", "naht")), None)
     return columns, label
+
+
+def _other_rotation(names: set[str]) -> str:
+    """What to call a rotation of other robots' makers, or a direction without one; "" for none of theirs."""
+    if {"q1", "q2", "q3", "q4"} <= names:
+        return "is w its q1, as ABB's is, or its q4? name them qw qx qy qz in their order; "
+    if {"a", "b", "c"} <= names and "d" not in names:
+        return "A B C of KUKA are yaw pitch roll about fixed axes, of milling machines not: name them so; "
+    if {"w", "p", "r"} <= names:
+        return "W P R of Fanuc are roll pitch yaw about fixed axes: name them so; "
+    if ({"i", "j", "k"} <= names and "w" not in names) or {"nx", "ny", "nz"} <= names:
+        return "a normal leaves the roll of the torch open; "
+    return ""
 
 
 def _scale(wanted: str, table: TextTable, found: dict[str, int], lines: list[str], where: str) -> float:
@@ -330,7 +356,7 @@ def _refuse_width(width: int, table: TextTable, number: int, where: str) -> None
     hint = ""
     if width == 7 and not table.names:
         hint = " (with a quaternion name them on the first line: x y z qx qy qz qw, w where it is)"
-    elif width == 12:
+    elif width == 12 and table.delimiter == ",":
         hint = " (decimal commas need ; between the columns)"
     elif width > len(WANTED) and not table.names:
         hint = " (name them on the first line)"

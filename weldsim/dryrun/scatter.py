@@ -21,7 +21,9 @@ STILL = (5e-5, 0.02)  # [m], of the longer steps: nearer waypoints were recorded
 STEP = 0.001  # [m] between the poses of a refitted path
 LEAST = (1e-6, 1e-5)  # [m], [rad] scatter that counts as none
 QUANTILE = 0.35  # of the waypoints' distances: two corners among a dozen waypoints have no say yet
-WEAVE = (24, 0.6)  # waypoints that tell a weave, and the share of the variance at one frequency; of noise a fifth
+WEAVE = {24: 0.9, 56: 0.7, 96: 0.6}  # share of the variance at one frequency that tells a weave, by waypoints; noise 1 in 100
+REPEATS = {4: 0.98, 12: 0.95, 24: 0.93}  # share of it that comes again every so many waypoints, likewise
+FREQUENCIES = 96  # waypoints from which one frequency tells enough, and what comes again is not looked for
 EVEN = 0.1  # of the variances of the scatter, the least over the greatest direction's: three axes of noise come to over 0.5
 LENGTHS = (0.9282, 1.2816)  # that share of vectors of two and of three independent standard normal components is shorter
 STRENGTHS = (1e-14, 1e2)  # of smoothing, over arc length in units of the path's own: none and almost a straight line
@@ -99,12 +101,30 @@ def is_even(path: TorchPath) -> bool:
 
 
 def _weaves(off: Float[ndarray, "m d"]) -> bool:
-    """Whether the distances from a smooth curve come and go at one frequency, as a weave's do: noise has them all."""
+    """Whether the distances from a smooth curve come and go at one frequency, or come again after so many waypoints, as a
+    weave's do: noise has all frequencies, and never comes again."""
+    if len(off) < FREQUENCIES and _repeated(off) > _at_least(REPEATS, len(off)):
+        return True
     power = np.sum(np.abs(np.fft.rfft(off - off.mean(axis=0), axis=0)[1:]) ** 2, axis=1)
-    if len(off) < WEAVE[0] or power.sum() <= 0:
+    if power.sum() <= 0:
         return False
     line = int(power.argmax())
-    return bool(power[max(line - 1, 0) : line + 2].sum() > WEAVE[1] * power.sum())
+    return bool(power[max(line - 1, 0) : line + 2].sum() > _at_least(WEAVE, len(off)) * power.sum())
+
+
+def _at_least(limits: dict[int, float], count: int) -> float:
+    """The limit for so many waypoints; for fewer than any is given for, one that nothing is above."""
+    return next((limits[least] for least in sorted(limits, reverse=True) if count >= least), np.inf)
+
+
+def _repeated(off: Float[ndarray, "m d"]) -> float:
+    """The greatest share of the variance of rows that comes again every k rows, at least twice; 0 of rows that are all alike."""
+    off = off - off.mean(axis=0)
+    total, share = float((off**2).sum()), 0.0
+    for k in range(2, len(off) // 2 + 1):
+        rest = sum(float(((off[i::k] - off[i::k].mean(axis=0)) ** 2).sum()) for i in range(k))
+        share = max(share, 1.0 - rest / total) if total > 0 else 0.0
+    return share
 
 
 def _off_cubic(values: Float[ndarray, "n d"], weights: Float[ndarray, "m 4"]) -> Float[ndarray, "m d"]:

@@ -237,6 +237,8 @@ class _Parser:
             items = self._items("]")
             if len(items) == 6:
                 return tree.PoseLiteral(token.line, items)
+            if len(items) > 2:  # an element has one index, or two
+                raise ScriptError(f"a pose p[...] has six values, not {len(items)}", token.line)
             return tree.Index(token.line, tree.Name(token.line, "p"), items)
         return tree.Name(token.line, token.text)
 

@@ -119,7 +119,7 @@ def test_the_choice_meant_is_told_and_is_one(line, option, meant, capsys):
 
 
 def test_choices_are_named_in_the_order_of_the_help(capsys):
-    assert "one of m, cm, mm, in" in answer(["plan", "a.ply", "--units", "x"], capsys)
+    assert "one of m, cm, mm, um, in, ft" in answer(["plan", "a.ply", "--units", "x"], capsys)
     assert "one of profile, thesis" in answer(["plan", "a.ply", "--method", "x"], capsys)
 
 

@@ -175,6 +175,11 @@ def test_models_that_are_known_and_more_coefficients() -> None:
         ({"D": "soft", "coeffs": LENS}, "'soft' is not known"),
         ({"D": [0.1, None, 0, 0]}, "d: "),
         ({"depth": FOCAL | {"fx": 1.0}}, "gives 'fx' twice"),
+        ({"kappa": -120.0}, "kappa: of a division model of the lens, which is not known"),
+        ({"distortion_model": "division", "Lambda": -1e-6}, "lambda: of a division model"),
+        ({"k1": 0.05, "k2": 0.01, "k3": 0.001, "k4": 0.0001}, "k1 to k4 without p1 and p2: of a fisheye lens, or rational"),
+        ({"camera_matrix": [[600.0, 0, 311.0], [0, 600.0, 227.0], [0, 0, 1]]}, "the principal point twice, and differently"),
+        ({"skew": 2.5}, "skew 2.5: pixels aslant are not modelled"),
     ],
 )
 def test_what_is_not_known_is_refused(more: dict[str, Any], words: str) -> None:
@@ -237,3 +242,51 @@ def test_lists_that_are_no_coefficients_are_passed_over() -> None:
         {"p": [620.0, 0, 311.5, 0, 0, 619.0, 227.5, 0, 0, 0, 1, 0]},
     ):
         assert read_camera(FOCAL | more).distortion == ()
+
+
+MATLAB = {"ImageSize": [480, 640], "RadialDistortion": LENS[:2], "TangentialDistortion": LENS[2:4]}
+FROM_ONE = [[620.0, 0, 312.0], [0, 619.0, 228.0], [0, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    "focal",
+    [
+        {"FocalLength": [620.0, 619.0], "PrincipalPoint": [312.0, 228.0], "Skew": 0},
+        {"K": FROM_ONE},
+        {"IntrinsicMatrix": np.transpose(FROM_ONE).tolist()},
+        {"FocalLength": [620.0, 619.0], "PrincipalPoint": [312.0, 228.0], "K": FROM_ONE},
+    ],
+)
+def test_matlabs_image_size_is_rows_and_columns_and_its_first_pixel_is_one(focal: dict[str, Any]) -> None:
+    wanted = CameraIntrinsics.from_opencv(**FOCAL, distortion=tuple(LENS[:4]))  # type: ignore[arg-type]
+    assert astuple(read_camera(MATLAB | focal)) == astuple(wanted)
+    assert astuple(read_camera({"Intrinsics": MATLAB | focal})) == astuple(wanted)
+
+
+def test_focal_lengths_and_principal_point_as_lists() -> None:
+    wanted = CameraIntrinsics.from_opencv(**FOCAL)  # type: ignore[arg-type]
+    size, centre = {"image_size": [640, 480]}, {"principal_point": [311.0, 227.0]}
+    assert astuple(read_camera(size | centre | {"focal_length": [620.0, 619.0]})) == astuple(wanted)
+    one = CameraIntrinsics.from_opencv(**FOCAL | {"fy": 620.0})  # type: ignore[arg-type]
+    assert astuple(read_camera(size | centre | {"focal_length": 620.0})) == astuple(one)
+
+
+def test_the_name_of_the_model_that_is_asked_for_helps() -> None:
+    lens = {"k1": 0.05, "k2": 0.01, "k3": 0.001, "k4": 0.0001}
+    assert read_camera(FOCAL | lens | {"distortion_model": "rational_polynomial"}).distortion == (
+        0.05,
+        0.01,
+        0,
+        0,
+        0.001,
+        0.0001,
+        0,
+        0,
+    )
+
+
+def test_an_image_whose_sides_are_swapped_is_told_so(tmp_path: Path) -> None:
+    np.save(tmp_path / "depth.npy", np.full((480, 640), 0.5))
+    (tmp_path / "camera.json").write_text(json.dumps(FOCAL | {"width": 480, "height": 640}))
+    with pytest.raises(CloudFileError, match="are width and height swapped there, rows first"):
+        read_depth_frame(tmp_path / "depth.npy", tmp_path / "camera.json")

@@ -312,10 +312,19 @@ def test_errors_share_a_root() -> None:
     assert CloudFileError.exit_code == CloudError.exit_code == 2
 
 
-def test_packed_and_wide_text_are_named(tmp_path):
-    (tmp_path / "a.ply.gz").write_bytes(gzip.compress(b"ply\n"))
-    with pytest.raises(CloudFileError, match="unpack it first"):
-        read_cloud(tmp_path / "a.ply.gz")
+def test_gzip_is_unpacked_and_damage_in_it_named(tmp_path):
+    points = np.random.default_rng(0).uniform(0, 0.3, (500, 3))
+    write_cloud(tmp_path / "a.ply", PointCloud(points=points))
+    packed = gzip.compress((tmp_path / "a.ply").read_bytes())
+    (tmp_path / "a.ply.gz").write_bytes(packed)
+    np.testing.assert_array_equal(read_cloud(tmp_path / "a.ply.gz").points, points)
+    for damaged in (packed[:-9], packed[:40] + b"\xff" * 9 + packed[49:], packed[:1] + b"\x8b"):
+        (tmp_path / "a.ply.gz").write_bytes(damaged)
+        with pytest.raises(CloudFileError, match="its gzip data is damaged or cut off"):
+            read_cloud(tmp_path / "a.ply.gz")
+
+
+def test_wide_text_is_named(tmp_path):
     np.save(tmp_path / "depth.npy", np.full((96, 128), 0.4))
     with pytest.raises(CloudFileError, match="--intrinsics"):
         read_cloud(tmp_path / "depth.npy")

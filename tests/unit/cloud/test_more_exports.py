@@ -80,7 +80,10 @@ def test_utf_16_without_its_mark(read, codec: str) -> None:
     ("line", "unit"),
     [
         ("# units: mm", "mm"), ("# Unit [cm]", "cm"), ("// unit of length is inch", "inch"), ("# units in: mm", "mm"),
-        ("# intensity has no unit", None), ("# units in", None), ("# unit normals", None), ("units: mm", None),
+        ("# intensity has no unit", None), ("# units in", None), ("# unit normals", None), ("units: mm", "mm"),
+        ("Unit;mm", "mm"), ("Einheit: mm", "mm"), ("Units: in", "in"),
+        ("# mm", "mm"), ("# all coordinates in mm", "mm"), ("# in", None),
+        ("// dimensions in inches", "inches"), ("# obtained in mm", None), ("Scan in mm", None), ("unit,x,y,z", None),
     ],
 )  # fmt: skip
 def test_a_unit_in_a_comment(read, line: str, unit: str | None) -> None:
@@ -88,7 +91,7 @@ def test_a_unit_in_a_comment(read, line: str, unit: str | None) -> None:
     if unit == "mm":
         np.testing.assert_allclose(read(text(f"{line}\nx,y,z", POINTS * 1e3)), POINTS, atol=1e-9)
         np.testing.assert_allclose(read(text(line, POINTS * 1e3)), POINTS, atol=1e-9)
-        ply = ply_bytes(xyz_columns(POINTS * 1e3)).replace(b"comment made for a test", f"comment {line[2:]}".encode())
+        ply = ply_bytes(xyz_columns(POINTS * 1e3)).replace(b"comment made for a test", f"comment {line.lstrip('# ')}".encode())
         np.testing.assert_allclose(read(ply), POINTS, atol=1e-9)
         with pytest.raises(CloudError, match="--units cm, but its header says mm; leave --units out"):
             read(ply, unit="cm")
@@ -105,13 +108,18 @@ def test_lists_that_belong_to_the_vertices_of_a_ply(read) -> None:
         np.testing.assert_array_equal(read(head(kind, *axes, listed) + after), POINTS)
         before = b"".join(struct.pack(f"{order}B2f3d", 2, 0, 1, *point) for point in POINTS)
         np.testing.assert_array_equal(read(head(kind, listed, *axes) + before), POINTS)
-        uneven = after[: -len(after) // 2] + struct.pack(f"{order}3dB", 0, 0, 0, 0) + after
-        with pytest.raises(CloudFileError, match="'tex' of its vertices have different lengths: export them without"):
-            read(head(kind, *axes, listed) + uneven)
+        lists = [[0.5] * (i % 4) for i in range(len(POINTS))]
+        uneven = [struct.pack(f"{order}2dB{len(t)}fd", x, y, len(t), *t, z) for (x, y, z), t in zip(POINTS, lists, strict=True)]
+        np.testing.assert_array_equal(read(head(kind, *axes[:2], listed, axes[2]) + b"".join(uneven)), POINTS)
+        with pytest.raises(CloudFileError, match="its header promises 150 points, the file holds 149: cut off"):
+            read(head(kind, *axes[:2], listed, axes[2]) + b"".join(uneven)[:-1])
     rows = "\n".join(f"{x} {y} {z} {i % 3} {'7 ' * (i % 3)}" for i, (x, y, z) in enumerate(POINTS))
     np.testing.assert_array_equal(read(head("ascii", *axes, listed) + rows.encode()), POINTS)
-    with pytest.raises(CloudFileError, match="a list before x, y and z: export them without"):
-        read(head("ascii", listed, *axes) + rows.encode())
+    first = [f"{i % 3} {'7 ' * (i % 3)}{x} {y} {z}" for i, (x, y, z) in enumerate(POINTS)]
+    np.testing.assert_array_equal(read(head("ascii", listed, *axes) + "\n".join(first).encode()), POINTS)
+    for damaged, words in (([*first[:-1], "2 7"], "its vertex 150 cannot be read"), (first[:-1], "the file holds 149")):
+        with pytest.raises(CloudFileError, match=words):
+            read(head("ascii", listed, *axes) + ("\n".join(damaged) + "\n" * 999).encode())
 
 
 @pytest.mark.parametrize(
@@ -147,3 +155,58 @@ def test_a_pose_with_units_in_its_keys_and_one_whose_angles_are_open(tmp_path: P
 def test_the_camera_of_nerf_tools() -> None:
     camera = read_camera({"w": 640, "h": 480, "fl_x": 620.0, "fl_y": 619.0, "cx": 311.0, "cy": 227.0, "k1": 0.1, "k2": -0.2})
     assert (camera.width, camera.fx, camera.fy, camera.distortion[:2]) == (640, 620.0, 619.0, (0.1, -0.2))
+
+
+def test_columns_of_ply_and_pcd_by_other_names_are_believed_with_their_units(read) -> None:
+    x, y, z = POINTS.T * 1e3
+    ply = ply_bytes([("intensity", "f8", x), ("z_mm", "f8", z), ("posy_mm", "f8", y), ("px_mm", "f8", x)])
+    np.testing.assert_allclose(read(ply), POINTS, atol=1e-9)
+    rows = "".join(f"{x} {y} {z}\n" for x, y, z in POINTS * 1e3)
+    head = f"VERSION 0.7\nFIELDS {{}}\nSIZE 8 8 8\nTYPE F F F\nWIDTH {len(POINTS)}\nHEIGHT 1\nDATA ascii\n"
+    np.testing.assert_allclose(read(head.format("x_mm y_mm z_mm") + rows), POINTS, atol=1e-9)
+    np.testing.assert_allclose(read("# .PCD v0.7\n# units: mm\n" + head.format("x y z") + rows), POINTS, atol=1e-9)
+    for names in ("x_mm y_mm z_cm", "x_mm px_mm z_mm", "a b c"):
+        with pytest.raises(CloudFileError, match=r"(are not in one unit that is known|it has no x, y and z)"):
+            read(head.format(names) + rows)
+
+
+@pytest.mark.parametrize("scale", [1e6, 1e4])
+def test_whole_numbers_are_told_to_be_micrometres_or_counts_and_the_remedy_works(read, scale: float) -> None:
+    """Not to be of single precision, which they need not be."""
+    x, y = np.meshgrid(np.arange(-0.12, 0.12, 0.0011), np.arange(-0.53, -0.37, 0.0013))
+    points = np.round(np.column_stack([x.ravel(), y.ravel(), 0.01 * np.sin(40 * x.ravel())]), 4)
+    rows = text("x,y,z", np.round(points * scale).astype(int))
+    if scale == 1e6:
+        with pytest.raises(CloudError, match=r"it looks like micrometres: pass --units um$"):
+            read(rows)
+        np.testing.assert_allclose(read(rows, unit="um"), points, atol=1e-9)
+        np.testing.assert_allclose(read("# units: um\n" + rows), points, atol=1e-9)
+    else:
+        with pytest.raises(CloudError, match="its coordinates are whole numbers, counts of a sensor perhaps: multiply them"):
+            read(rows)
+
+
+def test_a_header_in_metres_over_millimetres_is_told_and_feet_are_read(read) -> None:
+    with pytest.raises(CloudError, match="its header says metres, but it looks like millimetres: correct the header"):
+        read(text("x [m],y [m],z [m]", np.round(POINTS * 1e3, 3)))
+    np.testing.assert_allclose(read(text("# units: feet", POINTS / 0.3048)), POINTS, atol=1e-9)
+    with pytest.raises(CloudError, match=r"read in um \(least 5 mm\); it looks like millimetres: pass --units mm"):
+        read(text("", POINTS * 1e3), unit="um")
+
+
+def test_a_label_before_the_points_is_not_taken_for_x_and_the_advice_works(read) -> None:
+    rows = [[i * 7 % 3, *point] for i, point in enumerate(POINTS)]
+    with pytest.raises(CloudFileError, match=r"a label or an intensity perhaps: name the columns in a first line \(label x y z"):
+        read(text("", rows, " "))
+    np.testing.assert_array_equal(read(text("label x y z", rows, " ")), POINTS)
+    profile = [[i % 15, i // 15 + 0.5, 0.25, 7] for i in range(150)]  # x in whole millimetres and an intensity behind
+    assert len(read(text("", profile, " "), unit="mm")) == 150
+
+
+def test_colours_of_16_bits(tmp_path: Path) -> None:
+    colours = np.random.default_rng(0).integers(0, 256, (150, 3))
+    bands = [(name, "u2", column * 257) for name, column in zip(("red", "green", "blue"), colours.T, strict=True)]
+    (tmp_path / "a.ply").write_bytes(ply_bytes([*xyz_columns(POINTS), *bands]))
+    found = read_cloud(tmp_path / "a.ply").colours
+    assert found is not None
+    np.testing.assert_allclose(found, colours / 255, atol=1e-6)

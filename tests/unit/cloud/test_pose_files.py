@@ -99,6 +99,23 @@ def test_the_same_pose_however_it_is_written(put, content: Any) -> None:
         ({"matrix": np.array(M)[[1, 0, 2, 3]].tolist()}, "left-handed"),
         (f"{P[0]} {P[1]} {P[2]} {QX} {QY} {QZ} {W}", "7 numbers"),
         ([*P, *V], "6 numbers"),
+        ({"T_base_camera_link": M}, "T_base_camera_link: the x axis of that frame looks ahead"),
+        ({"base_to_camera_link": M}, "looks ahead"),
+        ({"parent": "base", "child": "d435_camera_link", "T": M}, "pose of d435_camera_link"),
+        ({"from": "camera_color_frame", "to": "base", "matrix": M}, "pose of camera_color_frame"),
+        ({"T_base_link_camera_optical": M}, "half a turn about z from a UR controller's base"),
+        ({"parent_frame": "base_link", "matrix": M}, "half a turn about z"),
+        ({"robot_base_frame": "base_link", "matrix": M}, "half a turn about z"),
+        (
+            {"header": {"frame_id": "camera_depth_optical_frame"}, "child_frame_id": "base", "matrix": M},
+            "from the base to the camera",
+        ),
+        ({"from": "base", "to": "camera_optical_frame", "matrix": M}, "from the base to the camera"),
+        ({"parent": "tool0", "child": "camera_optical_frame", "matrix": M}, "parent tool0: it is a pose of or in the hand"),
+        ({"frame_id": "base", "child_frame_id": "tool0", "matrix": M}, "child_frame_id tool0: it is a pose of or in the hand"),
+        ({"R_cam2gripper": X.R.tolist(), "t_cam2gripper": P}, "R_cam2gripper: is the camera's pose in the hand"),
+        ({"R_base2cam": X.R.tolist(), "t_base2cam": P}, "R_base2cam: may lead from the base"),
+        ("<opencv_storage></opencv_storage>", "is XML; give the same figures as JSON or YAML"),
     ],
 )
 def test_what_leaves_the_pose_open_is_refused_in_one_line(put, content: Any, words: str) -> None:
@@ -114,4 +131,22 @@ def test_the_names_that_are_asked_for_help(put) -> None:
         np.testing.assert_allclose(read_pose(put({"position": P, key: quaternion})).matrix, M, atol=1e-9)
     degrees = {"position": P, "rpy_deg": np.degrees(RPY).tolist()}
     np.testing.assert_allclose(read_pose(put(degrees)).matrix, M, atol=1e-9)
+    np.testing.assert_allclose(read_pose(put({"parent_frame": "base", "matrix": M})).matrix, M, atol=1e-9)
     np.testing.assert_allclose(read_pose(put({"matrix": np.linalg.inv(X.inverse().matrix).tolist()})).matrix, M, atol=1e-9)
+
+
+def test_more_names_of_the_same_pose(put) -> None:
+    column = [[value] for value in P]
+    rows = "\n".join(";".join(f"{value:.9f}".replace(".", ",") for value in row) for row in M)
+    for content in (
+        {"R_cam2base": X.R.tolist(), "t_cam2base": column},
+        {"T_cam2base": M},
+        {"T": np.array(M).T.tolist()},  # MATLAB's, rows from the right
+        {"parent": "base", "child": "camera_depth_optical_frame", "T": M},
+        {"source": "camera_optical_frame", "target": "base", "matrix": M},
+        {"matrix": MM, "translation_unit": "mm"},
+        rows,
+        rows.replace(";", " "),
+        rows.replace(";", "\t"),
+    ):
+        np.testing.assert_allclose(read_pose(put(content)).matrix, M, atol=1e-6)

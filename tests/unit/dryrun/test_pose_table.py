@@ -149,3 +149,51 @@ def test_a_unit_that_a_comment_gives_is_kept_in_the_advice_and_asked_about_where
     np.testing.assert_allclose(read_poses(named, "a.csv").poses[:, :3], P, atol=1e-8)
     with pytest.raises(InputError, match=r"m from the base \(limit 3 m\), read in mm as the file says; is that its unit\?$"):
         read_poses(table("x [mm],y [mm],z [mm],rx,ry,rz", P * 1e6, V), "a.csv")
+
+
+def test_two_columns_that_may_be_x_are_refused_and_both_remedies_work() -> None:
+    rotation = "rx,ry,rz"
+    both = table(f"flange_x,flange_y,flange_z,tcp_x,tcp_y,tcp_z,{rotation}", P + 0.1, P, V)
+    with pytest.raises(
+        InputError, match="two of its columns may be x: flange_x and tcp_x; call those that are meant x y z rx ry rz"
+    ):
+        read_poses(both, "a.csv")
+    for text in (
+        table(f"flange_x,flange_y,flange_z,x [mm],y [mm],z [mm],{rotation}", P + 0.1, P * 1e3, V),
+        table(f"x [mm],y [mm],z [mm],tcp_x,tcp_y,tcp_z,{rotation}", P * 1e3, P + 0.1, V),
+        table(f"tcp_x,tcp_y,tcp_z,{rotation}", P, V),
+    ):
+        np.testing.assert_allclose(read_poses(text, "a.csv").poses[:, :3], P, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "named", "turns", "words"),
+    [
+        ("q1,q2,q3,q4", "qw,qx,qy,qz", Q[:, [3, 0, 1, 2]], "is w its q1, as ABB's is, or its q4"),
+        (
+            "A [deg],B [deg],C [deg]",
+            "yaw [deg],pitch [deg],roll [deg]",
+            np.degrees(RPY[:, ::-1]),
+            "A B C of KUKA are yaw pitch roll",
+        ),
+        ("W [deg],P [deg],R [deg]", "roll [deg],pitch [deg],yaw [deg]", np.degrees(RPY), "W P R of Fanuc are roll pitch yaw"),
+    ],
+)
+def test_rotations_of_other_makers_are_told_what_to_be_called_and_it_works(
+    given: str, named: str, turns: np.ndarray, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        read_poses(table(f"X [mm],Y [mm],Z [mm],{given}", P * 1e3, turns), "a.csv")
+    found = read_poses(table(f"X [mm],Y [mm],Z [mm],{named}", P * 1e3, turns), "a.csv").poses
+    np.testing.assert_allclose(matrix_from_rotation_vector(found[:, 3:]), matrix_from_rotation_vector(V), atol=1e-6)
+
+
+def test_a_quaternion_counted_from_0_begins_with_w() -> None:
+    found = read_poses(table("x,y,z,q0,q1,q2,q3", P, Q[:, [3, 0, 1, 2]]), "a.csv").poses
+    np.testing.assert_allclose(matrix_from_rotation_vector(found[:, 3:]), matrix_from_rotation_vector(V), atol=1e-6)
+
+
+@pytest.mark.parametrize(("title", "scale"), [("Units: inch", 0.0254), ("Unit;mm", 1e-3), ("# all positions in mm", 1e-3)])
+def test_a_unit_in_a_title_is_believed(title: str, scale: float) -> None:
+    text = f"Path of today\n{title}\n" + table("X;Y;Z;RX;RY;RZ", P / scale, V, separator=";")
+    np.testing.assert_allclose(read_poses(text, "a.csv").poses[:, :3], P, atol=1e-6)

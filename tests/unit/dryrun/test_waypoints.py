@@ -195,7 +195,7 @@ def test_travel_that_turns_back_is_called_that_each_time(empty: Cell, scatter) -
 def test_a_weave_is_no_scatter_and_is_not_flattened(empty: Cell, legs, wide) -> None:
     """Waypoints at its corners, or some on each leg."""
     u = np.arange(80 * legs + 1) / legs
-    across = wide * (2 * np.abs((u + 0.5) % 2 - 1) - 1)
+    across = wide * (2 * np.abs((u + (0.5 if legs > 1 else 0.0)) % 2 - 1) - 1)
     points = np.stack([0.002 * u - 0.08, -0.45 + across, np.full(len(u), 0.1)], axis=1)
     straight = torch_path(points * [1.0, 0.0, 1.0] + [0.0, -0.45, 0.0], DOWN, speed=0.002)
     weave = replace(straight, X_BT=Transform("BT", straight.X_BT.R, points), s=arc_length(points), roll_free=False)
@@ -204,6 +204,26 @@ def test_a_weave_is_no_scatter_and_is_not_flattened(empty: Cell, legs, wide) -> 
     if legs == 1:
         followed, _ = try_waypoints(weave, "weave", empty, CONFIG)
         assert project(points, followed.X_BT.p)[0].max() < 0.1 * wide
+
+
+@pytest.mark.parametrize(("count", "legs"), [(8, 1), (12, 1), (12, 2), (16, 3), (20, 2), (27, 3), (30, 1), (45, 4)])
+def test_a_weave_of_few_waypoints_is_no_scatter(count, legs) -> None:
+    u = np.arange(count) / legs
+    across = 0.0025 * (2 * np.abs((u + (0.5 if legs > 1 else 0.0)) % 2 - 1) - 1)
+    points = np.stack([0.004 * u - 0.08, -0.45 + across, np.full(count, 0.1)], axis=1).round(4)
+    straight = torch_path(points, DOWN, speed=0.002)
+    assert scatter_of(straight).position == 0.0
+
+
+@pytest.mark.parametrize("count", [8, 12, 16, 23, 30, 36, 45, 60, 90, 120])
+@pytest.mark.parametrize("flat", [False, True])
+def test_scatter_of_few_waypoints_is_no_weave(count, flat) -> None:
+    """White noise comes again, or has one frequency, in less than one path of ten."""
+    rng, found = np.random.default_rng(count), []
+    for _ in range(60):
+        points = np.stack([0.004 * np.arange(count), *rng.normal(0, 3e-4, (2, count)) * [[1], [0 if flat else 1]]], axis=1)
+        found.append(scatter_of(torch_path(points, DOWN, speed=0.002)).position > 0)
+    assert np.mean(found) > 0.9
 
 
 @pytest.mark.parametrize("count", [200, 1000, 5000])

@@ -127,3 +127,27 @@ def test_a_column_that_tells_lines_apart_is_named_and_without_it_the_file_is_rea
     with pytest.raises(SceneError, match=r"column 'Seam' tells lines apart; a part has one seam"):
         read(tmp_path / "a.csv", "x,y,z,Seam\n0,0,0,1\n1,0,0,1\n0,1,0,2\n1,1,0,2\n")
     assert len(read(tmp_path / "a.csv", "x,y,z\n0,0,0\n1,0,0\n").points) == 2
+
+
+def test_names_of_points_and_directions_as_measuring_machines_export_them(tmp_path: Path) -> None:
+    body = [["Point 1", "Point 2", "Point 3"], *POINTS.T, *NORMALS.T]
+    lines = [";".join(f"{value}".replace(".", ",") for value in row) for row in zip(*body, strict=True)]
+    for head in ("Name;X;Y;Z;Nx;Ny;Nz", "Element;X;Y;Z;I;J;K"):
+        seam = read(tmp_path / "s.csv", "\n".join([head, *lines, ""]))
+        np.testing.assert_allclose(seam.points, POINTS * 1e-3, atol=1e-12)
+        np.testing.assert_allclose(seam.normals, NORMALS)
+
+
+@pytest.mark.parametrize("column", ["Name", "id"])
+def test_names_that_tell_lines_apart_are_refused_and_one_line_of_them_is_read(tmp_path: Path, column: str) -> None:
+    one = [f"1,{x},{y},{z}" for x, y, z in POINTS]
+    other = [f"2,{x},{y + 60},{z}" for x, y, z in POINTS]
+    with pytest.raises(SceneError, match=f"column '{column}' has '1' more than once: does it tell lines apart"):
+        read(tmp_path / "s.csv", "\n".join([f"{column},x,y,z", *one, *other, ""]))
+    np.testing.assert_allclose(read(tmp_path / "s.csv", "\n".join([f"{column},x,y,z", *one, ""])).points, POINTS * 1e-3)
+
+
+@pytest.mark.parametrize("title", ["Units: m", "# all in metres", "# coordinates in m", "Unit;m"])
+def test_a_unit_in_a_title_outranks_the_scenes(tmp_path: Path, title: str) -> None:
+    text = f"{title}\nx,y,z\n" + rows(POINTS * 1e-3, ",")
+    np.testing.assert_allclose(read(tmp_path / "s.csv", text).points, POINTS * 1e-3, atol=1e-12)

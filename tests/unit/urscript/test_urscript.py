@@ -212,6 +212,7 @@ def test_what_cannot_be_compiled_is_refused_with_its_line(text, said):
         ("sync()\nwhile True:\n a = 1\nend", "line 2: infinite loop"),
         ("def p():\n global x = 1\n def f():\n  return f()\n end\n f()\nend", "nested too deeply"),
         ("if 1 == 2: x = 1 end\nnote(x)", "line 2: variable 'x' is used before it is assigned"),
+        ("set_tcp(p[0, 0, 0])", "line 1: a pose p[...] has six values, not 3"),
         ("p = p[1, 2, 3, 4, 5, 6]\np[0] = [1]", "line 2: expected a number"),
     ],
 )

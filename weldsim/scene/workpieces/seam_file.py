@@ -1,7 +1,7 @@
 """The seam of one's own part: a text file of points on the groove's opening, in order."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ MOST = 100_000  # lines
 _BRACKETED = re.compile(r"^\s*[\[({]+([-+.\d\s,;eE]+)[\])}]+\s*[,;]?\s*$")  # a point as Python and others print it
 UNIT_LENGTH = 0.25  # by which normals without names may be off 1: rotation vectors look like them
 LABELS = ("seam", "line", "curve", "weld", "segment", "part", "polyline", "path", "seam_id", "line_id", "group")
+POINT_NAMES = ("name", "names", "element", "elements", "label", "id", "nr", "no", "number", "index")  # of points, or of lines
 WANTED = "wanted are x, y, z, and perhaps nx, ny, nz and width"
 
 
@@ -73,6 +74,7 @@ def read_seam_file(path: Path, scale: float) -> SeamFile:
     numbers = np.array([row for row in rows if row is not None])
     points = np.stack([numbers[:, i] * scales[name] for i, name in enumerate(column) if name in AXES], axis=1)
     _refuse_commas(path, table, numbers, column)
+    _refuse_lines(path, table, lines)
     count = len(points)
     moved = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0])
     numbers, points = numbers[moved], points[moved]
@@ -140,6 +142,7 @@ def _columns(path: Path, table: TextTable, scale: float) -> tuple[dict[str, int]
 
 def _named(path: Path, names: tuple[ColumnName, ...]) -> dict[str, int]:
     listed = ", ".join(name.text for name in names)[:60]
+    names = _with_direction(names)
     try:
         found = by_role(names)
     except ValueError:
@@ -154,6 +157,15 @@ def _named(path: Path, names: tuple[ColumnName, ...]) -> dict[str, int]:
     if not found or None in roles or len(set(roles)) < len(roles) or len(set(NORMALS) & set(roles)) not in (0, 3):
         raise SceneError(f"{path}: columns {listed!r}; {WANTED}", path=str(path), allowed=COLUMNS)
     return {name: found[name] for name in COLUMNS if name in found}
+
+
+def _with_direction(names: tuple[ColumnName, ...]) -> tuple[ColumnName, ...]:
+    """The names with i, j and k, as measuring machines call a direction, for normals, where no others are and no quaternion."""
+    texts = [name.text.strip().lower() for name in names]
+    if {"i", "j", "k"} <= set(texts) and not {"w", "s"} & set(texts) and not any(name.role in NORMALS for name in names):
+        roles = dict(zip("ijk", NORMALS, strict=True))
+        return tuple(replace(name, role=roles.get(text, name.role)) for name, text in zip(names, texts, strict=True))
+    return names
 
 
 def _scale(path: Path, name: ColumnName, scale: float) -> float:
@@ -190,6 +202,22 @@ def _refuse_names(path: Path, lines: list[str]) -> None:
     if len(left) > 1:
         number, line = left[1]
         raise SceneError(f"{path}, line {number}: {line.strip()[:60]!r} are no numbers; {WANTED}", path=str(path), line=number)
+
+
+def _refuse_lines(path: Path, table: TextTable, lines: list[str]) -> None:
+    """Raises SceneError where a column of names has some of them again: it tells lines apart, not points."""
+    at = next((i for i, name in enumerate(table.names or ()) if name.text.strip().lower() in POINT_NAMES), None)
+    if at is None or table.names is None:
+        return
+    rows = [table.cells(line) for line in lines[table.first :] if line.strip() and not is_comment(line)]
+    called = [row[at] for row in rows if len(row) > at]
+    if 1 < len(set(called)) < len(called):
+        again = next(name for i, name in enumerate(called) if name in called[:i])
+        raise SceneError(
+            f"{path}: column {table.names[at].text!r} has {again[:30]!r} more than once: does it tell lines apart? a part has one"
+            " seam: keep the rows of one, and its x, y, z",
+            path=str(path),
+        )
 
 
 def _refuse_commas(path: Path, table: TextTable, numbers: Float[ndarray, "n k"], column: dict[str, int]) -> None:
