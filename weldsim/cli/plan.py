@@ -8,7 +8,7 @@ import tyro
 
 from weldsim import units
 from weldsim.cli.options import ConfigOptions, Method, refuse_together
-from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
+from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file, refuse_run
 from weldsim.cli.quantities import COUNT, POINT, quantities, quantity
 from weldsim.cli.show import Tell, progress, reasons_refused, table, times
 from weldsim.counted import counted
@@ -141,6 +141,7 @@ class Plan(ConfigOptions):
         if suffix == ".png":
             return None, self.report
         refuse_file(self.report, "--report", "a page ends in .html, a picture in .png, a folder in neither")
+        refuse_run(self.report, "--report")
         return self.report / "report.html", self.report / "report.png"
 
     def _plan(self, config: "CellConfig", tell: Tell) -> "tuple[PlanResult, Clock]":

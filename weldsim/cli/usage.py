@@ -90,6 +90,7 @@ def parse(words: Sequence[str]) -> Command | int:
     if name not in COMMANDS:
         raise InputError(f"{_no_command(words)}; see weldsim --help", words=list(words))
     command, said = COMMANDS[name].load(), io.StringIO()
+    _refuse_empty(name, words[1:])
     words = [name, *gathered(words[1:], _quantities(command))]
     _check_options(name, command, words[1:])
     try:
@@ -104,6 +105,16 @@ def parse(words: Sequence[str]) -> Command | int:
         if not ending.code:
             return 0
         raise InputError(one_line(said.getvalue(), words), words=list(words)) from None
+
+
+def _refuse_empty(name: str, words: Sequence[str]) -> None:
+    """Raises InputError for a word without content, as a shell's variable that is not set leaves it."""
+    for before, word in pairwise(["", *words]):
+        option, equals, value = word.partition("=")
+        if not word.strip() or (equals and option.startswith("--") and not value.strip()):
+            where = option if equals else before if before.startswith("-") else ""
+            what = f"{where}: its value is empty" if where else "an argument is empty"
+            raise InputError(f"{what}; see weldsim {name} --help", words=[name, *words])
 
 
 def overview() -> str:
