@@ -171,12 +171,15 @@ class Plan(ConfigOptions):
     def _read(self, config: "CellConfig") -> "PointCloud":
         """The cloud in the file. Raises CloudFileError, CloudError, ConfigError."""
         from weldsim.cloud.deproject import deproject
+        from weldsim.cloud.depth_files import check_depth_unit
         from weldsim.cloud.files import read_cloud, read_depth_frame
 
         if self.intrinsics is None:
             box = config.cloud
             crop = None if box.crop_min is None or box.crop_max is None else (box.crop_min, box.crop_max)
             return read_cloud(self.cloud, unit=self.units, viewpoint=self.viewpoint, crop=crop)
+        if self.depth_unit is not None:
+            check_depth_unit(self.intrinsics, self.depth_unit)
         count = {} if self.depth_unit is None else {"depth_unit": self.depth_unit}
         return deproject(read_depth_frame(self.cloud, self.intrinsics, pose=self.pose, **count))
 

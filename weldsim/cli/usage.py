@@ -66,6 +66,7 @@ COMMANDS: dict[str, Entry] = {
 }
 DESCRIPTION = "Simulation-first digital twin of a vision-guided arc-welding cell. `weldsim --version` prints the version."
 HELP = ("-h", "--help")
+LISTS = ("--scenes", "--methods")  # options of several values
 
 _CHOICE = re.compile(r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)")
 _NUMBER = re.compile(r"error parsing (\S+): .*(?:int\(\)|float|INT|FLOAT).*(?:: '|\[')(.*)'")
@@ -91,6 +92,7 @@ def parse(words: Sequence[str]) -> Command | int:
         raise InputError(f"{_no_command(words)}; see weldsim --help", words=list(words))
     command, said = COMMANDS[name].load(), io.StringIO()
     _refuse_empty(name, words[1:])
+    _refuse_bare(name, words[1:])
     words = [name, *gathered(words[1:], _quantities(command))]
     _check_options(name, command, words[1:])
     try:
@@ -115,6 +117,13 @@ def _refuse_empty(name: str, words: Sequence[str]) -> None:
             where = option if equals else before if before.startswith("-") else ""
             what = f"{where}: its value is empty" if where else "an argument is empty"
             raise InputError(f"{what}; see weldsim {name} --help", words=[name, *words])
+
+
+def _refuse_bare(name: str, words: Sequence[str]) -> None:
+    """Raises InputError for an option of several values that is given none: all there are would be taken, as without it."""
+    for word, after in pairwise([*words, "--"]):
+        if word in LISTS and after.startswith("-"):
+            raise InputError(f"{word}: its values are missing; see weldsim {name} --help", words=[name, *words])
 
 
 def overview() -> str:

@@ -299,6 +299,8 @@ def test_a_file_of_settings_that_are_not_read_is_refused(line, tmp_path, monkeyp
         ("scenes show straight -o ' '", "-o: its value is empty"),
         ("plan ''", "an argument is empty; see weldsim plan --help"),
         ("run ''", "an argument is empty"),
+        ("regress --scenes", "--scenes: its values are missing; see weldsim regress --help"),
+        ("regress --methods --seeds 1", "--methods: its values are missing"),
     ],
 )
 def test_a_file_is_what_its_name_says(line, says, tmp_path, monkeypatch, capsys):
