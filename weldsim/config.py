@@ -26,7 +26,19 @@ from weldsim.seam.config import SeamConfig
 from weldsim.sensor.d415 import D415Config, D435Config
 from weldsim.sensor.kinect import KinectConfig
 from weldsim.sensor.stereo_config import D415StereoConfig
-from weldsim.settings import DEFAULT, Given, Source, apply_overrides, load_toml, meant_keys, nearest, value_at, with_sources
+from weldsim.settings import (
+    DEFAULT,
+    Given,
+    Source,
+    apply_overrides,
+    listed,
+    load_toml,
+    meant_keys,
+    nearest,
+    nested,
+    value_at,
+    with_sources,
+)
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
@@ -147,7 +159,7 @@ def paced_for(config: CellConfig, scene: "SceneConfig | None") -> CellConfig:
     return replace(config, motion=for_scene(config, scene).motion)
 
 
-def load_scene(name: str | Path, overrides: Iterable[str] = ()) -> "SceneConfig":
+def load_scene(name: str | Path, overrides: Iterable[str] | Mapping[str, Any] = ()) -> "SceneConfig":
     """The scene of that name, or of a TOML file, with `key=value` overrides; paths in it start where its file is.
 
     Raises:
@@ -157,21 +169,30 @@ def load_scene(name: str | Path, overrides: Iterable[str] = ()) -> "SceneConfig"
     from weldsim.scene.files import anchored, scene_path
 
     path = scene_path(name)
-    tables, given = with_sources(load_toml(path), Source("scene", path.stem), overrides)
+    tables, given = with_sources(load_toml(path), Source("scene", path.stem), _of_scene(overrides))
     tables = {"name": path.stem, **anchored(tables, path.parent)}
     scene = replace(_structured(tables, SceneConfig, str(name), given), given=given)
     refuse_idle(scene)
     return scene
 
 
-def load_config(path: str | Path | Mapping[str, Any] | None = None, overrides: Iterable[str] = ()) -> CellConfig:
+def _of_scene(overrides: Iterable[str] | Mapping[str, Any]) -> list[str] | dict[str, Any]:
+    """The overrides of a scene's own keys; `scene.` before one, as the command line has it, is left out."""
+    if isinstance(overrides, Mapping):
+        return {str(key).removeprefix(SCENE): value for key, value in overrides.items()}
+    return [text.removeprefix(SCENE) if isinstance(text, str) else text for text in listed(overrides)]
+
+
+def load_config(
+    path: str | Path | Mapping[str, Any] | None = None, overrides: Iterable[str] | Mapping[str, Any] = ()
+) -> CellConfig:
     """The cell's config from a TOML file, or tables as one has them, or the defaults, with `key=value` overrides.
 
     Raises:
         ConfigError: the file or a setting is wrong.
     """
     where = str(path) if isinstance(path, str | Path) else "config"
-    data = path if isinstance(path, Mapping) else {} if path is None else load_toml(path)
+    data = nested(path) if isinstance(path, Mapping) else {} if path is None else load_toml(path)
     tables, given = with_sources(data, Source("file", "" if isinstance(path, Mapping) else where), overrides)
     return replace(_structured(tables, CellConfig, where, given), given=given)
 

@@ -14,9 +14,11 @@ from weldsim.cloud.extent import check_extent_of_array
 from weldsim.cloud.files import read_cloud
 from weldsim.config import CellConfig, load_config, load_scene
 from weldsim.counted import counted
-from weldsim.errors import CloudError, InputError, WeldsimError
+from weldsim.errors import CloudError, InputError, OutputError, WeldsimError
+from weldsim.output import place_of
 from weldsim.records import DepthFrame, PointCloud, Seam, SeamFindings
 from weldsim.schema import structure
+from weldsim.settings import nested
 
 if TYPE_CHECKING:
     from weldsim.scene.config import SceneConfig
@@ -92,7 +94,7 @@ def config_from(given: Any) -> CellConfig:
     if isinstance(given, CellConfig):
         return given
     if isinstance(given, Mapping):
-        return load_config(_nested(given))
+        return load_config(given)
     if isinstance(given, str) and "=" in given and not Path(given).exists():
         return load_config(None, [given])
     if isinstance(given, str | Path):
@@ -111,27 +113,8 @@ def scene_from(given: Any) -> "SceneConfig":
     if isinstance(given, str | Path):
         return load_scene(given)
     if isinstance(given, Mapping):
-        return structure(_nested(given), SceneConfig, where="scene")
+        return structure(nested(given), SceneConfig, where="scene")
     raise InputError(f"scene: {_kind(given)} is none; the name of one, a TOML file or a SceneConfig (weldsim.load_scene) is wanted")
-
-
-def _nested(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables in which a dotted key, "path.speed" say, stands for the tables that it names."""
-    out: dict[str, Any] = {}
-    for key, value in tables.items():
-        inner = _nested(value) if isinstance(value, Mapping) else value
-        for part in reversed(str(key).split(".")[1:]):
-            inner = {part: inner}
-        name = str(key).partition(".")[0]
-        both = isinstance(inner, Mapping) and isinstance(out.get(name), dict)
-        out[name] = _merged(out[name], inner) if both else inner
-    return out
-
-
-def _merged(first: dict[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
-    """Two tables as one; of two values the second."""
-    both = {key for key in first.keys() & second.keys() if isinstance(first[key], dict) and isinstance(second[key], Mapping)}
-    return {**first, **second, **{key: _merged(first[key], second[key]) for key in both}}
 
 
 def sighting_from(given: Any) -> Any:
@@ -145,6 +128,25 @@ def result_from(given: Any) -> Any:
     """The plan that is meant. Raises InputError for anything but what `weldsim.plan` returns."""
     if not all(hasattr(given, name) for name in ("findings", "paths", "cloud")):
         raise InputError(f"finish: {_kind(given)} is no plan; what weldsim.plan returned for the sighting's cloud is wanted")
+    return given
+
+
+def check_film(video: Any) -> None:
+    """Nothing, where a film can be written there, or none is asked for. Raises InputError, OutputError."""
+    if video is None:
+        return
+    if not isinstance(video, str | Path):
+        raise InputError(f"video: {_kind(video)} is none; the name of a file that ends in .mp4 is wanted")
+    if Path(video).suffix.lower() != ".mp4":
+        raise OutputError(f"video {video}: a film ends in .mp4", path=str(video))
+    if not place_of(video).parent.is_dir():
+        raise OutputError(f"video {video}: its folder does not exist", path=str(video))
+
+
+def run_from(given: Any) -> Any:
+    """The run that is meant. Raises InputError for anything but what `weldsim.run` and `weldsim.finish` return."""
+    if not all(hasattr(given, name) for name in ("plan", "report", "captures")):
+        raise InputError(f"write_run: {_kind(given)} is no run; what weldsim.run or weldsim.finish returned is wanted")
     return given
 
 

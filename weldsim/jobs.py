@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -93,15 +93,30 @@ def unplanned(result: PlanResult) -> tuple[str, ...]:
     return tuple(f"seam {index + 1} has no path: {error}" for index, error in result.refused.items())
 
 
+def check_meant(number: Any, near: Any) -> None:
+    """Nothing, where a seam may be meant: by its number, "all", a point near it, or nothing at all. Raises InputError."""
+    if number is not None and near is not None:
+        raise InputError("number and near exclude each other; give one", number=number, near=near)
+    if number is not None and number != "all" and (isinstance(number, bool) or not isinstance(number, int | np.integer)):
+        raise InputError(f'number {number!r:.60}: a whole number from 1 is needed, or "all"', number=number)
+    if near is None:
+        return
+    try:
+        point = np.asarray(near, float)
+    except (TypeError, ValueError):
+        point = np.zeros(0)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise InputError(f"near {near!r:.60}: three finite numbers in metres are needed", near=near)
+
+
 def pick(findings: SeamFindings, number: int | None = None, near: Sequence[float] | None = None) -> int:
     """Index of the seam that is meant: the best one, or the `number`-th from 1, or the one nearest to a point in B [m].
 
     Raises:
-        InputError: a number that no seam has, a point that is not finite.
+        InputError: a number that no seam has, a point that is none; both.
     """
+    check_meant(number, near)
     count = len(findings.seams)
-    if near is not None and not np.isfinite(near).all():
-        raise InputError(f"near {tuple(near)}: three finite numbers in metres are needed", near=tuple(near))
     if near is not None and count:
         distances = [project(np.array([near], float), seam.points_B)[0][0] for seam in findings.seams]
         return int(np.argmin(distances))

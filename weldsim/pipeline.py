@@ -24,6 +24,7 @@ from weldsim.inputs import (
     CloudLike,
     ConfigLike,
     SceneLike,
+    check_film,
     cloud_from,
     config_from,
     findings_from,
@@ -31,7 +32,7 @@ from weldsim.inputs import (
     scene_from,
     sighting_from,
 )
-from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, Weld, pick, seams_to_weld, unplanned
+from weldsim.jobs import Finder, PlanResult, RunResult, Sighting, Weld, check_meant, pick, seams_to_weld, unplanned
 from weldsim.path.asked import leaned, wire_tip
 from weldsim.path.plan import plan_paths
 from weldsim.records import ExecutionLog, PointCloud, SeamFindings, TorchPath, WeldReport
@@ -96,6 +97,8 @@ def run(
         WeldsimError: see the stages; finding no seam is a result, not an error.
     """
     config, clock = config_from(config), Clock(tell or (lambda stage, done: None))
+    check_meant(number, near)
+    check_film(video)
     seen = look(scene, config, seed=seed, sensor=sensor, clock=clock)
     result = plan(seen.cloud, config, clock=clock)
     return finish(seen, result, config, number=number, near=near, video=video, black_boxes=black_boxes, stops=True, clock=clock)
@@ -214,6 +217,7 @@ def finish(
     """
     seen, result = sighting_from(seen), result_from(result)
     config, clock, world = config_from(config), clock or Clock(), seen.world
+    check_film(video)
     meant = seams_to_weld(result, number, near)
     welds = _weld(seen, meant, config, clock, video, black_boxes) if execute and meant else ()
     if welds and welds[-1].error is not None and not stops:

@@ -17,6 +17,7 @@ from weldsim.cloud.files import write_cloud
 from weldsim.cloud.register import Registration
 from weldsim.config import CellConfig, for_scene, limits_for, to_json
 from weldsim.errors import OutputError
+from weldsim.inputs import ConfigLike, SceneLike, config_from, run_from, scene_from
 from weldsim.output import write_whole
 from weldsim.path.files import path_document, write_path_csv, write_path_json
 from weldsim.pipeline import RunResult
@@ -49,10 +50,10 @@ def check_run_folder(folder: Path) -> None:
 
 
 def write_run(
-    folder: Path,
+    folder: Path | str,
     result: RunResult,
-    config: CellConfig,
-    scene: "SceneConfig",
+    config: ConfigLike | None,
+    scene: SceneLike,
     seed: int,
     sensor: SensorName,
     *,
@@ -65,9 +66,10 @@ def write_run(
     report.html, report.png, log.npz where the arm moved, and run.json, which says what is what.
 
     Raises:
-        OutputError: it cannot be written; nothing is left then.
+        OutputError: it cannot be written; nothing is left then.  InputError: no run, config or scene.
     """
-    return folder_in_place(folder, lambda place: _fill(place, result, config, scene, seed, sensor), keep_earlier=keep_earlier)
+    done, cell, stood = run_from(result), config_from(config), scene_from(scene)
+    return folder_in_place(Path(folder), lambda place: _fill(place, done, cell, stood, seed, sensor), keep_earlier=keep_earlier)
 
 
 def folder_in_place(folder: Path, fill: Callable[[Path], None], *, keep_earlier: bool = True) -> Path | None:

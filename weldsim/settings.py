@@ -118,13 +118,13 @@ def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
     return with_sources(data, DEFAULT, overrides)[0]
 
 
-def with_sources(data: Mapping[str, Any], source: Source, overrides: Iterable[str]) -> tuple[dict[str, Any], dict[str, Source]]:
+def with_sources(
+    data: Mapping[str, Any], source: Source, overrides: Iterable[str] | Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, Source]]:
     """`apply_overrides`, and where each value that is now in the tables came from: `source`, or the command line."""
-    overrides = (overrides,) if isinstance(overrides, str) else overrides  # one may be given alone
     result: dict[str, Any] = deepcopy(dict(data))
     given = dict.fromkeys(leaves(result), source)
-    for text in overrides:
-        parts, value = _split(text)
+    for text, (parts, value) in _each(overrides):
         table = result
         for depth, part in enumerate(parts[:-1]):
             table = table.setdefault(part, {})
@@ -135,6 +135,25 @@ def with_sources(data: Mapping[str, Any], source: Source, overrides: Iterable[st
         given = {known: where for known, where in given.items() if not (known == key or known.startswith(f"{key}."))}
         given |= dict.fromkeys(leaves(value, key), COMMAND_LINE)
     return result, given
+
+
+def nested(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables in which a dotted key, "path.speed" say, stands for the tables that it names."""
+    out: dict[str, Any] = {}
+    for key, value in tables.items():
+        inner = nested(value) if isinstance(value, Mapping) else value
+        for part in reversed(str(key).split(".")[1:]):
+            inner = {part: inner}
+        name = str(key).partition(".")[0]
+        both = isinstance(inner, Mapping) and isinstance(out.get(name), dict)
+        out[name] = _merged(out[name], inner) if both else inner
+    return out
+
+
+def _merged(first: dict[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
+    """Two tables as one; of two values the second."""
+    both = {key for key in first.keys() & second.keys() if isinstance(first[key], dict) and isinstance(second[key], Mapping)}
+    return {**first, **second, **{key: _merged(first[key], second[key]) for key in both}}
 
 
 def key_of(override: str) -> str:
@@ -202,9 +221,27 @@ def _alike(key: str, known: Iterable[str]) -> list[str]:
     return [max(scored)[1]] if scored else named_like(name, below) or named_like(name, known)
 
 
+def _each(overrides: Iterable[str] | Mapping[str, Any]) -> Iterator[tuple[str, tuple[list[str], Any]]]:
+    """Each override as it was given, with the parts of its key and its value; one may be given alone, or all as a mapping."""
+    if isinstance(overrides, Mapping):
+        flat = nested(overrides)
+        yield from ((key, (key.split("."), value_at(flat, key))) for key in leaves(flat))
+        return
+    yield from ((text, _split(text)) for text in listed(overrides))
+
+
+def listed(overrides: Any) -> list[Any]:
+    """Overrides one by one. Raises ConfigError for what is no list of them."""
+    if isinstance(overrides, str):
+        return [overrides]
+    if not isinstance(overrides, Iterable):
+        raise ConfigError(f"overrides {overrides!r:.60}: a list of dotted.key=value, or a mapping, is wanted", value=overrides)
+    return list(overrides)
+
+
 def _split(text: str) -> tuple[list[str], Any]:
     """Parts of the key, and the value."""
-    key, equals, value = text.partition("=")
+    key, equals, value = text.partition("=") if isinstance(text, str) else ("", "", "")
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
         raise ConfigError(f"override {text!r}: write dotted.key=value, seam.method=thesis say", value=text)

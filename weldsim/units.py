@@ -158,7 +158,7 @@ def percent(text: str) -> float | None:
 
 def meant_percent(value: object, low: float, high: float) -> str:
     """What a bare number outside a share's range was meant as, '"30 %" is meant?'; "" where that lies outside too."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (high <= 1 < value and low <= value / 100 <= high):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not (high <= 2 < value and low <= value / 100 <= high):
         return ""
     return f'"{value:g} %" is meant?'
 

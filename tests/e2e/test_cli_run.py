@@ -359,3 +359,14 @@ def test_a_narrow_part_is_told_with_settings_that_find_its_groove(tmp_path, monk
     main([*words, *shlex.split(options[1])])
     assert "no seam was found" not in capsys.readouterr().out
     assert json.loads((tmp_path / "runs" / "straight-0" / "report.json").read_text())["plan"]["mean"] < 0.4e-3
+
+
+def test_a_part_without_a_seam_file_has_no_phantom_seams_in_regress_either(own_part, capsys):
+    own_part(seam=False)
+    words = ["regress", "--scenes", "mine.toml", "--methods", "profile", "--seeds", "1", "--jobs", "1", "--sensor", "exact"]
+    assert main([*words, "--html", "page.html", "--junit", "out.xml"]) == 0
+    head, row = (re.split("  +", line.strip()) for line in capsys.readouterr().out.splitlines()[:2])
+    figures = dict(zip(head, row, strict=True))
+    assert (figures["scene"], figures["mean mm"], figures["phantom mm"], figures["IoU"]) == ("mine", "-", "-", "-")
+    assert main([*words, "--json"]) == 0
+    assert "phantom" not in json.dumps(json.loads(capsys.readouterr().out)["rows"][0]["figures"])

@@ -2,8 +2,12 @@
 
 import base64
 import json
+import os
 import re
+import signal
+import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +16,7 @@ import cv2
 import numpy as np
 import pytest
 
+import weldsim
 from tests.clouds import groove_cloud
 from weldsim.cli import main
 from weldsim.cloud.files import read_cloud
@@ -310,3 +315,27 @@ def test_a_recorded_cloud_is_judged_against_a_seam_in_a_csv(tmp_path):
     np.savetxt(tmp_path / "dot.csv", np.tile(made.seam.opening_B[:1], (5, 1)), delimiter=",")
     with pytest.raises(InputError):
         read_known_seam(tmp_path / "dot.csv")
+
+
+@pytest.mark.parametrize("after", [0.0, 0.3, 1.0, 3.0])
+def test_a_key_that_interrupts_leaves_one_line_and_no_file(after, tmp_path):
+    """The workers get Ctrl-C too, as they begin, wait or work; `after` their start [s]."""
+    words = ["regress", "--scenes", "straight", "curve", "--methods", "profile", "--seeds", "2", "--jobs", "2", "--html", "a.html"]
+    command = subprocess.Popen(
+        [sys.executable, "-m", "weldsim", *words],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(Path(weldsim.__file__).parents[1])},
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    children = Path(f"/proc/{command.pid}/task/{command.pid}/children")
+    deadline = time.monotonic() + 60.0
+    while len(children.read_text().split()) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    time.sleep(after)
+    os.killpg(command.pid, signal.SIGINT)
+    said = command.communicate(timeout=60)
+    assert (command.returncode, *said) == (130, "", "weldsim: interrupted\n")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]

@@ -9,7 +9,7 @@ import pytest
 import weldsim
 from tests.clouds import groove_cloud
 from weldsim.cloud.files import write_cloud
-from weldsim.config import CellConfig, load_scene
+from weldsim.config import CellConfig, load_config, load_scene
 from weldsim.errors import InputError, RecordError, WeldsimError
 from weldsim.inputs import cloud_from, config_from, findings_from, scene_from
 from weldsim.records import DepthFrame, PointCloud, Seam, SeamFindings
@@ -290,3 +290,98 @@ def test_one_seam_of_ones_own_is_welded_by_the_path_alone():
     result = weldsim.plan(made.cloud, find=lambda cloud: made.seam.opening_B)
     assert result.paths[0] is not None
     assert result.paths[0].s[-1] == pytest.approx(made.seam.length, rel=1e-3)
+
+
+def said_by(calls: str) -> list[str]:
+    """What each of these calls raises, a line each, in a process without the tests' checker of types, which would see it first."""
+    program = (
+        "import weldsim\nfrom weldsim import *\n"
+        f"for call in ({calls}):\n"
+        "    try:\n        print('no error:', call())\n"
+        "    except weldsim.WeldsimError as error:\n        print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()
+
+
+def test_a_seam_or_film_that_cannot_be_meant_is_told_before_the_scan(tmp_path):
+    said = said_by(
+        "lambda: run('plain', number='al'), lambda: run('plain', number=1.5), lambda: run('plain', near=(1, 0)),"
+        "lambda: run('plain', near='0 0 0'), lambda: run('plain', near=(0, 0, float('nan'))),"
+        "lambda: run('plain', number=1, near=(0, 0, 0)), lambda: run('plain', video='a.avi'),"
+        f"lambda: run('plain', video={str(tmp_path / 'none' / 'a.mp4')!r}), lambda: run('plain', video=3),"
+    )
+    assert said == [
+        "number 'al': a whole number from 1 is needed, or \"all\"",
+        'number 1.5: a whole number from 1 is needed, or "all"',
+        "near (1, 0): three finite numbers in metres are needed",
+        "near '0 0 0': three finite numbers in metres are needed",
+        "near (0, 0, nan): three finite numbers in metres are needed",
+        "number and near exclude each other; give one",
+        "video a.avi: a film ends in .mp4",
+        f"video {tmp_path}/none/a.mp4: its folder does not exist",
+        "video: an int is none; the name of a file that ends in .mp4 is wanted",
+    ]
+
+
+def test_what_is_no_unit_viewpoint_or_box_of_a_cloud_is_told(tmp_path):
+    file = str(write_cloud(tmp_path / "a.ply", POINTS))
+    corners = "a lower and an upper corner, x, y, z in metres each, are needed"
+    said = said_by(
+        f"lambda: read_cloud({file!r}, unit='km'), lambda: read_cloud({file!r}, viewpoint='0 0 1'),"
+        f"lambda: read_cloud({file!r}, crop=((0, 0, 0),)), lambda: read_cloud({file!r}, crop=((0, 0, 0), (-1, 1, 1))),"
+    )
+    assert said == [
+        "unit 'km' is not one of m, cm, mm, in",
+        "viewpoint '0 0 1': three finite numbers in metres are needed",
+        f"crop ((0, 0, 0),): {corners}",
+        f"crop ((0, 0, 0), (-1, 1, 1)): {corners}",
+    ]
+
+
+def test_settings_of_a_scene_may_be_named_as_on_the_command_line():
+    for given in (
+        "groove.width=10 mm",
+        ["scene.groove.width=10 mm"],
+        {"groove.width": "10 mm"},
+        {"groove": {"width": "10 mm"}},
+        {"scene.groove.width": "10 mm"},
+    ):
+        assert load_scene("straight", given).groove.width == pytest.approx(0.01)
+    with pytest.raises(WeldsimError, match=r"did you mean scene\.groove\.width"):
+        load_scene("straight", ["groove.widht=10 mm"])
+    assert load_config({"path.speed": "6 mm/s"}).path.speed == pytest.approx(0.006)
+    config = load_config(None, {"path.speed": "6 mm/s", "path": {"step": "1 mm"}})
+    assert (config.path.speed, config.path.step) == pytest.approx((0.006, 0.001))
+    assert config.source("path.speed").kind == "command line"
+    for calls in ("lambda: load_config(None, 3),", "lambda: load_scene('straight', 3),"):
+        assert said_by(calls) == ["overrides 3: a list of dotted.key=value, or a mapping, is wanted"]
+    assert said_by("lambda: load_config(None, [3]),")[0].startswith("override 3: write dotted.key=value")
+
+
+def test_a_run_is_written_by_names_and_what_is_no_run_is_told(tmp_path):
+    program = (
+        "import weldsim\nfrom pathlib import Path\n"
+        "seen = weldsim.look('plain', sensor='exact', move=False)\n"
+        "plan = weldsim.plan(seen.cloud)\n"
+        "done = weldsim.finish(seen, plan, execute=False)\n"
+        "weldsim.write_run('a run', done, None, 'plain', 0, 'exact')\n"
+        "print(*sorted(path.name for path in Path('a run').iterdir()))\n"
+        "calls = (lambda: weldsim.write_run('b', plan, None, 'plain', 0, 'exact'), lambda: weldsim.write_junit(None, 'b.xml'),"
+        " lambda: weldsim.regress('plain', seeds='3'), lambda: weldsim.regress('plain', jobs=1.5),"
+        " lambda: weldsim.regress('plain', golden='none.json'))\n"
+        "for call in calls:\n"
+        "    try:\n        call()\n    except weldsim.WeldsimError as error:\n        print(error)\n"
+        "print(*sorted(path.name for path in Path('.').iterdir()))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
+    files, *said, left = done.stdout.splitlines()
+    assert {"run.json", "report.html", "path.json", "config.json"} <= set(files.split())
+    assert said == [
+        "write_run: a PlanResult is no run; what weldsim.run or weldsim.finish returned is wanted",
+        "write_junit: a file name and what weldsim.regress returned, in this order, are wanted, not NoneType, str",
+        "seeds '3': a whole number, 1 or more, is needed",
+        "jobs 1.5: a whole number, 1 or more, is needed",
+        "none.json: no such golden file; record one with --update --reason",
+    ]
+    assert left == "a run"

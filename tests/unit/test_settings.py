@@ -380,3 +380,20 @@ def test_what_quotes_do_not_mend_is_not_told_to_want_them(tmp_path):
     with pytest.raises(ConfigError) as caught:
         load_toml(file)
     assert "; write" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("setting", "meant"),
+    [
+        ("report.max=0.4", '"0.4 mm" is meant'),
+        ("report.mean=0.2", '"0.2 mm" is meant'),
+        ("report.tracking=0.3", '"0.3 mm" is meant'),
+        ("report.coverage=95", '"95 %" is meant'),
+        ("scene.limits.max=0.4", '"0.4 mm" is meant'),
+    ],
+)
+def test_a_limit_that_was_meant_in_millimetres_or_percent_is_asked_back(setting: str, meant: str, capsys) -> None:
+    assert main(["config", "straight", "--set", setting]) == 2
+    assert meant in capsys.readouterr().err
+    key = setting.partition("=")[0]
+    assert main(["config", "straight", "--set", f"{key}={meant.split(chr(34))[1]}"]) == 0

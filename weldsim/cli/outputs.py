@@ -34,7 +34,9 @@ def check_folder(folder: Path, path: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except (OSError, ValueError) as error:
-        reason = (getattr(error, "strerror", None) or str(error)) if folder.is_dir() else "no such folder"
+        reason = getattr(error, "strerror", None) or str(error)
+        if not folder.is_dir():
+            reason = "it is a file, no folder" if folder.exists() else "no such folder"
         raise OutputError(f"{path}: cannot be written in {folder} ({reason})", path=str(path)) from None
 
 
@@ -45,10 +47,18 @@ def nearest_folder(path: Path) -> Path:
 
 def check_suffix(path: Path | None, allowed: tuple[str, ...], what: str, *, others: Mapping[str, str] | None = None) -> None:
     """Raises OutputError when `path` does not end as `what` does; `others` are options that write what it ends as."""
+    if path is not None and path.name.lower() in allowed:
+        raise OutputError(f"{path}: a name is missing before {path.name}", path=str(path))
     if path is not None and path.suffix.lower() not in allowed:
         option = (others or {}).get(path.suffix.lower())
         hint = f"; did you mean {option} {path}?" if option is not None else ""
         raise OutputError(f"{path}: {what} ends in {' or '.join(allowed)}{hint}", path=str(path), allowed=list(allowed))
+
+
+def refuse_run(folder: Path, option: str) -> None:
+    """Raises OutputError where files of their own would replace those of a run."""
+    if (folder / "run.json").is_file():
+        raise OutputError(f"{option} {folder}: holds a run, whose report would be lost; give another folder", path=str(folder))
 
 
 FILES = (".json", ".csv", ".html", ".htm", ".pdf", ".png", ".jpg", ".svg", ".mp4", ".toml", ".ply", ".npz", ".txt", ".md", ".xml")

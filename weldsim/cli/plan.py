@@ -8,7 +8,7 @@ import tyro
 
 from weldsim import units
 from weldsim.cli.options import ConfigOptions, Method, refuse_together
-from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file
+from weldsim.cli.outputs import check_folder, check_outputs, check_suffix, nearest_folder, refuse_file, refuse_run
 from weldsim.cli.quantities import COUNT, POINT, quantities, quantity
 from weldsim.cli.show import Tell, progress, reasons_refused, table, times
 from weldsim.counted import counted
@@ -141,6 +141,7 @@ class Plan(ConfigOptions):
         if suffix == ".png":
             return None, self.report
         refuse_file(self.report, "--report", "a page ends in .html, a picture in .png, a folder in neither")
+        refuse_run(self.report, "--report")
         return self.report / "report.html", self.report / "report.png"
 
     def _plan(self, config: "CellConfig", tell: Tell) -> "tuple[PlanResult, Clock]":
@@ -170,12 +171,15 @@ class Plan(ConfigOptions):
     def _read(self, config: "CellConfig") -> "PointCloud":
         """The cloud in the file. Raises CloudFileError, CloudError, ConfigError."""
         from weldsim.cloud.deproject import deproject
+        from weldsim.cloud.depth_files import check_depth_unit
         from weldsim.cloud.files import read_cloud, read_depth_frame
 
         if self.intrinsics is None:
             box = config.cloud
             crop = None if box.crop_min is None or box.crop_max is None else (box.crop_min, box.crop_max)
             return read_cloud(self.cloud, unit=self.units, viewpoint=self.viewpoint, crop=crop)
+        if self.depth_unit is not None:
+            check_depth_unit(self.intrinsics, self.depth_unit)
         count = {} if self.depth_unit is None else {"depth_unit": self.depth_unit}
         return deproject(read_depth_frame(self.cloud, self.intrinsics, pose=self.pose, **count))
 

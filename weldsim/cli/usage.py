@@ -66,6 +66,7 @@ COMMANDS: dict[str, Entry] = {
 }
 DESCRIPTION = "Simulation-first digital twin of a vision-guided arc-welding cell. `weldsim --version` prints the version."
 HELP = ("-h", "--help")
+LISTS = ("--scenes", "--methods")  # options of several values
 
 _CHOICE = re.compile(r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)")
 _NUMBER = re.compile(r"error parsing (\S+): .*(?:int\(\)|float|INT|FLOAT).*(?:: '|\[')(.*)'")
@@ -90,6 +91,8 @@ def parse(words: Sequence[str]) -> Command | int:
     if name not in COMMANDS:
         raise InputError(f"{_no_command(words)}; see weldsim --help", words=list(words))
     command, said = COMMANDS[name].load(), io.StringIO()
+    _refuse_empty(name, words[1:])
+    _refuse_bare(name, words[1:])
     words = [name, *gathered(words[1:], _quantities(command))]
     _check_options(name, command, words[1:])
     try:
@@ -104,6 +107,23 @@ def parse(words: Sequence[str]) -> Command | int:
         if not ending.code:
             return 0
         raise InputError(one_line(said.getvalue(), words), words=list(words)) from None
+
+
+def _refuse_empty(name: str, words: Sequence[str]) -> None:
+    """Raises InputError for a word without content, as a shell's variable that is not set leaves it."""
+    for before, word in pairwise(["", *words]):
+        option, equals, value = word.partition("=")
+        if not word.strip() or (equals and option.startswith("--") and not value.strip()):
+            where = option if equals else before if before.startswith("-") else ""
+            what = f"{where}: its value is empty" if where else "an argument is empty"
+            raise InputError(f"{what}; see weldsim {name} --help", words=[name, *words])
+
+
+def _refuse_bare(name: str, words: Sequence[str]) -> None:
+    """Raises InputError for an option of several values that is given none: all there are would be taken, as without it."""
+    for word, after in pairwise([*words, "--"]):
+        if word in LISTS and after.startswith("-"):
+            raise InputError(f"{word}: its values are missing; see weldsim {name} --help", words=[name, *words])
 
 
 def overview() -> str:

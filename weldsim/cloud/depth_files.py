@@ -97,6 +97,20 @@ def write_depth_png(path: str | Path, depth: Float32[ndarray, "h w"], *, depth_u
 # Text ---------------------------------------------------------------------------------------------------------------
 
 
+def check_depth_unit(intrinsics_path: str | Path, depth_unit: float) -> None:
+    """Raises CloudFileError where the camera's file says another length of a count [m] than `depth_unit`."""
+    table = read_table(intrinsics_path)
+    if "depth_scale" not in table:
+        return
+    try:
+        said = _scale(table, depth_unit)
+    except Unreadable as error:
+        raise CloudFileError(f"{intrinsics_path}: {error}", path=str(intrinsics_path), reason=str(error)) from None
+    if not np.isclose(said, depth_unit, rtol=1e-3, atol=0.0):
+        reason = f"depth_scale is {said:g} m a count, --depth-unit {depth_unit:g} m; leave that out, or correct the file"
+        raise CloudFileError(f"{intrinsics_path}: {reason}", path=str(intrinsics_path), reason=reason)
+
+
 def _scale(table: dict[str, Any], depth_unit: float) -> float:
     unit = float(numbers(table, "depth_scale", ())) if "depth_scale" in table else depth_unit
     if not 1e-9 < unit < 1.0:

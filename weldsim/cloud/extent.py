@@ -85,7 +85,18 @@ def check_extent_of_array(name: str, points: Float[ndarray, "n 3"]) -> None:
     raise CloudError(f"{name}: spans {span:.4g} m (limit {MILLIMETRE_SPAN:g} m): {advice}", span=span)
 
 
-def cropped_to(box: tuple[Sequence[float], Sequence[float]], points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
+def check_box(box: Sequence[Sequence[float]] | Float[ndarray, "2 3"]) -> Float[ndarray, "2 3"]:
+    """Lower and upper corner [m] of a crop box. Raises CloudError for what is none."""
+    try:
+        corners = np.array(box, float)
+    except (TypeError, ValueError):
+        corners = np.zeros(0)
+    if corners.shape != (2, 3) or np.isnan(corners).any() or (corners[0] >= corners[1]).any():
+        raise CloudError(f"crop {box!r:.100}: a lower and an upper corner, x, y, z in metres each, are needed", crop=box)
+    return corners
+
+
+def cropped_to(box: Sequence[Sequence[float]] | Float[ndarray, "2 3"], points: Float[ndarray, "n 3"]) -> Bool[ndarray, "n"]:
     """Which points (n,) lie in a box given by its corners, edges included."""
     low, high = np.array(box[0], float), np.array(box[1], float)
     x, y, z = ((points >= low) & (points <= high)).T

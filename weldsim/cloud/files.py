@@ -16,7 +16,7 @@ from numpy import ndarray
 
 from weldsim.cloud.arrays import read_array_cloud
 from weldsim.cloud.depth_files import read_depth_frame, write_depth_png
-from weldsim.cloud.extent import MIN_SPAN, check_extent, check_grain, check_reach, check_viewpoints, cropped_to
+from weldsim.cloud.extent import METRES, MIN_SPAN, check_box, check_extent, check_grain, check_reach, check_viewpoints, cropped_to
 from weldsim.cloud.pcd import read_pcd
 from weldsim.cloud.ply import read_ply
 from weldsim.cloud.ptx import is_ptx, read_ptx
@@ -64,6 +64,9 @@ def read_cloud(
         CloudFileError: missing, unreadable, cut off, or no cloud.
         CloudError: no finite point, coordinates too coarse, an extent that shows that `unit` is wrong, or a camera too far away.
     """
+    if unit is not None and unit not in METRES:
+        raise CloudError(f"unit {unit!r} is not one of {', '.join(METRES)}", unit=unit)
+    box = None if crop is None else check_box(crop)
     data, given = unpacked(path, read_bytes(path)), _given(viewpoint)
     if utf_16(data) is not None:  # as spreadsheets save text
         data = decode(data).encode()
@@ -83,8 +86,8 @@ def read_cloud(
         raise CloudError(f"{path}: none of its {counted(total, 'point')} is finite", path=str(path), total=total)
     with np.errstate(over="ignore", invalid="ignore"):
         check_grain(str(path), raw.points[keep] if dropped else raw.points, scale)
-        if crop is not None:
-            keep &= cropped_to(crop, raw.points * scale)
+        if box is not None:
+            keep &= cropped_to(box, raw.points * scale)
             if not keep.any():
                 raise CloudError(
                     f"crop box: none of the {counted(total, 'point')} of {path} is in it; change cloud.crop_min and crop_max"
@@ -169,7 +172,10 @@ def _given(viewpoint: Sequence[float] | ndarray | None) -> Float[ndarray, "3"] |
     """Where the caller says that the camera stood [m]. Raises CloudError for what is no place."""
     if viewpoint is None:
         return None
-    given = np.asarray(viewpoint, float).reshape(-1)
+    try:
+        given = np.asarray(viewpoint, float).reshape(-1)
+    except (TypeError, ValueError):
+        given = np.zeros(0)
     if given.shape != (3,) or not np.isfinite(given).all():
         raise CloudError(f"viewpoint {viewpoint!r}: three finite numbers in metres are needed", viewpoint=viewpoint)
     return given

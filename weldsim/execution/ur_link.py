@@ -76,7 +76,7 @@ def open_link(config: UrConfig, name: str) -> Link:
                 raise refuse(trouble)
         return Link(series=series, period=PERIODS[series], identity=identity, arm=arm, stream=stream, client=client, first=first)
     except (LinkError, ClientError) as error:
-        hint = "" if isinstance(error, ClientError) else "; is it switched on, and is that its address (--host, ur.host)?"
+        hint = "" if isinstance(error, ClientError) else "; is it switched on, and is that its address (--host, execution.ur.host)?"
         trouble = _meanwhile(config, stream) or Trouble("connection", f"not connected: {error}{hint}")
         _abandon(stream, client)
         raise refuse(trouble) from None

@@ -81,7 +81,8 @@ class Figures:
 
     Attributes:
         scene, method, seed: of what.  known, found: how many seams there are, how many were found.
-        missed: known seams without a path.  phantoms: seams found that are none; phantom_length: theirs [m].
+        missed: known seams without a path.  phantoms: seams found that are none; phantom_length: theirs [m];
+            None where the scene's seams are not known.
         mean, p95, max: cross-track distance of the planned tip from the opening [m].
         coverage: share of the known length.  axis_median, axis_p95: wire axis from the known inward bisector [rad].
         iou: points of the cloud in both the groove region found and the true one, over points in either; a point is truly
@@ -97,8 +98,8 @@ class Figures:
     known: int
     found: int = 0
     missed: int = 0
-    phantoms: int = 0
-    phantom_length: float = 0.0
+    phantoms: int | None = 0
+    phantom_length: float | None = 0.0
     mean: float | None = None
     p95: float | None = None
     max: float | None = None
@@ -115,7 +116,9 @@ class Figures:
 
     def judged(self) -> dict[str, float | None]:
         """The figures that have a meaning here, None for one that has and could not be measured (no seam found)."""
-        out: dict[str, float | None] = {name: getattr(self, name) for name in ("missed", "phantoms", "phantom_length")}
+        out: dict[str, float | None] = {"missed": self.missed}
+        if self.phantoms is not None:
+            out |= {"phantoms": self.phantoms, "phantom_length": self.phantom_length}
         if self.known:
             out |= {name: getattr(self, name) for name in ("mean", "p95", "max", "coverage", "axis_median", "axis_p95")}
         for name in ("iou", "executed_mean", "executed_p95", "tracking_p95", "seconds"):

@@ -123,6 +123,8 @@ def _planned(task: Task, method: str, seen: Sighting) -> Row:
         true_region=true_region(seen.captures, result.cloud) if seen.world.workpiece.region_is_known else None,
         report=done.report,
     )
+    if not seen.world.workpiece.seams_are_known:
+        figures = replace(figures, phantoms=None, phantom_length=None)
     figures = replace(figures, refused=refused or "; ".join(map(str, result.refused.values())))
     entries = task.golden.get(method, {})
     deviations = compare(figures, entries)

@@ -6,6 +6,7 @@ Methods whose record is a distribution have one more suite, with a case for each
 from pathlib import Path
 from xml.etree import ElementTree
 
+from weldsim.errors import InputError
 from weldsim.output import write_whole
 from weldsim.regression.golden import Deviation
 from weldsim.regression.job import Row
@@ -42,8 +43,11 @@ def junit_xml(outcome: Regression) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def write_junit(path: Path, outcome: Regression) -> Path:
-    """The file written. Raises OutputError."""
+def write_junit(path: Path | str, outcome: Regression) -> Path:
+    """The file written. Raises OutputError, InputError for anything but a file name and what `weldsim.regress` returned."""
+    if not isinstance(path, str | Path) or not isinstance(outcome, Regression):
+        kinds = ", ".join(type(each).__name__ for each in (path, outcome))
+        raise InputError(f"write_junit: a file name and what weldsim.regress returned, in this order, are wanted, not {kinds}")
     return write_whole(path, junit_xml(outcome))
 
 

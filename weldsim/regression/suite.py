@@ -2,12 +2,14 @@
 
 import multiprocessing
 import os
+import signal
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +19,7 @@ from weldsim.inputs import ConfigLike, SceneLike, config_from, scene_from
 from weldsim.pipeline import Finder, SensorName
 from weldsim.regression.distribution import Judgement, Shift, judge
 from weldsim.regression.finders import METHODS, Method, told_apart
-from weldsim.regression.golden import Deviation, Golden
+from weldsim.regression.golden import Deviation, Golden, read_golden
 from weldsim.regression.job import Row, Task, carry_out
 from weldsim.scene.files import scene_names
 
@@ -80,8 +82,8 @@ def regress(
     config: ConfigLike | None = None,
     sensor: SensorName = "d415",
     execute: bool = False,
-    golden: Golden | None = None,
-    keep: Path | None = None,
+    golden: Golden | Path | str | None = None,
+    keep: Path | str | None = None,
     pictures: bool = False,
     tell: Tell | None = None,
 ) -> Regression:
@@ -96,7 +98,7 @@ def regress(
         jobs: processes, each with one core (threads of native libraries are held to one); 1 = this process.
         config: settings; its method is replaced by each of `methods`.
         sensor: what looks.  execute: whether the simulated arm welds what was planned.
-        golden: figures to judge by; what it lacks is not judged.
+        golden: figures to judge by, or their file; what it lacks is not judged.
         keep: folder in which what fails leaves its run directory.
         pictures: whether rows of seed 0 carry a picture.
         tell: told of progress.
@@ -110,8 +112,9 @@ def regress(
     settings = _settings(config_from(config), own, finders)
     count_of = {method: (seeds_of or {}).get(method, seeds) for method in settings}
     for name, value in (("seeds", seeds), ("jobs", jobs), *count_of.items()):
-        if value < 1:
-            raise InputError(f"{name} {value}: 1 or more is needed", key=name, value=value)
+        if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+            raise InputError(f"{name} {value!r}: a whole number, 1 or more, is needed", key=name, value=value)
+    golden = read_golden(golden) if isinstance(golden, str | Path) else golden
     tasks = [
         Task(
             scene=scene,
@@ -120,7 +123,7 @@ def regress(
             finders=finders,
             execute=execute,
             golden={} if golden is None else {method: golden.entries(scene.name, method) for method in settings},
-            keep=keep,
+            keep=None if keep is None else Path(keep),
             sensor=sensor,
             pictures=pictures and seed == 0,
         )
@@ -181,19 +184,46 @@ def _in_processes(tasks: list[Task], jobs: int, tell: Tell) -> list[tuple[Row, .
     out: list[tuple[Row, ...]] = [()] * len(tasks)
     longest = sorted(range(len(tasks)), key=lambda k: -len(tasks[k].scene.views))
     try:
-        with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-            waiting = {pool.submit(carry_out, tasks[k]): k for k in longest}
+        with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_quietly) as pool:
+            with _held_back(signal.SIGINT):  # workers start with it held back too
+                waiting = {pool.submit(_in_worker, tasks[k]): k for k in longest}
             try:
                 for count, future in enumerate(as_completed(waiting), start=1):
                     k = waiting[future]
                     out[k] = future.result()
                     tell(f"{tasks[k].scene.name}, seed {tasks[k].seed}", count / len(tasks))
             except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
+                with _held_back(signal.SIGINT):  # who presses twice does not cut the tidying short
+                    pool.shutdown(cancel_futures=True)
                 raise
     except BrokenProcessPool:
         raise ExecutionError("a worker process died (out of memory?); use fewer jobs", rule="jobs", value=jobs) from None
     return out
+
+
+@contextmanager
+def _held_back(number: int) -> Iterator[None]:
+    """Within the block the signal waits; it takes effect after it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {number})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_quietly() -> None:
+    """A worker that starts, or waits for a task, just ends on Ctrl-C; Python would print a traceback."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _in_worker(task: Task) -> tuple[Row, ...]:
+    """`carry_out` in a process of its own; within it Ctrl-C raises, so that what is half-written is removed."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return carry_out(task)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

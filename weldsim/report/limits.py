@@ -10,7 +10,8 @@ from weldsim.records import LineError, Pace, WeldReport
 
 DEGREE = math.pi / 180
 RANGES = {  # below 0, or over all of the seam, nothing passes
-    **dict.fromkeys(("mean", "p95", "max", "tracking", "ends"), (-1.0, 1.0)),
+    **dict.fromkeys(("mean", "p95", "max", "tracking"), (-1.0, 0.1)),
+    "ends": (-1.0, 1.0),
     **dict.fromkeys(("axis_median", "axis_p95"), (-3.15, 3.15)),
     "coverage": (-1.0, 2.0),
     "speed": (-1.0, 100.0),

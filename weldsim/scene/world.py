@@ -179,7 +179,7 @@ def check_standing(config: SceneConfig, standing: Standing) -> None:
         advice = "turn it (pose.yaw) or take a smaller part"
     else:
         x, y = 1e3 * (np.array([config.pose.x, config.pose.y]) + move)
-        advice = f'pose.x = "{x:.10g} mm" and pose.y = "{y:.10g} mm" would do'
+        advice = f'the nearest place where it can stand: pose.x = "{x:.10g} mm", pose.y = "{y:.10g} mm"'
     raise SceneError(f"pose of scene {config.name!r}: {fault}; {advice}", scene=config.name, key="pose", fault=fault)
 
 

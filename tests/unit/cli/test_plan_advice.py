@@ -53,6 +53,12 @@ def test_a_depth_unit_that_is_proposed_is_taken_as_it_is_printed(tmp_path: Path,
     option = re.search(r'--depth-unit "([^"]+)"', said)
     assert option is not None
     assert "no seam found" in refused(capsys, *words, "--depth-unit", option[1], code=1)
+    # Where the camera's file says another unit, neither is quietly taken.
+    (tmp_path / "k.json").write_text(json.dumps(camera | {"depth_scale": 1e-4}))
+    assert "no seam found" in refused(capsys, *words, "--depth-unit", option[1], code=1)
+    said = refused(capsys, *words, "--depth-unit", "1 mm")
+    assert "k.json: depth_scale is 0.0001 m a count, --depth-unit 0.001 m; leave that out, or correct the file" in said
+    assert "no seam found" in refused(capsys, *words, code=1)
 
 
 @pytest.mark.parametrize(("land", "noise"), [(12, "none"), (14, "none"), (14, "d415"), (16, "d415")])

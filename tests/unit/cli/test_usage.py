@@ -99,7 +99,7 @@ def test_outputs_are_tried_and_nothing_is_left(tmp_path):
         check_outputs([tmp_path])
     with pytest.raises(OutputError, match="no such folder"):
         check_outputs([tmp_path / "no" / "a"])
-    with pytest.raises(OutputError, match="no such folder"):
+    with pytest.raises(OutputError, match="it is a file, no folder"):
         check_outputs([taken / "a"])
     with pytest.raises(InputError, match="given twice"):
         check_outputs([tmp_path / "a", tmp_path / "." / "a"])

@@ -291,12 +291,31 @@ def test_a_file_of_settings_that_are_not_read_is_refused(line, tmp_path, monkeyp
         ("scan straight --out scan.json", "a cloud ends in .ply"),
         ("scan straight --depth depth.jpg", ".png, .npy"),
         ("run straight --video weld.avi", "a film ends in .mp4"),
+        ("run straight --video .mp4", ".mp4: a name is missing before .mp4"),
+        ("plan a.ply --out .json", ".json: a name is missing before .json"),
+        ("plan a.ply --out ''", "--out: its value is empty; see weldsim plan --help"),
+        ("plan a.ply --out=", "--out: its value is empty"),
+        ("plan a.ply --near 0 '' 0", "an argument is empty"),
+        ("scenes show straight -o ' '", "-o: its value is empty"),
+        ("plan ''", "an argument is empty; see weldsim plan --help"),
+        ("run ''", "an argument is empty"),
+        ("regress --scenes", "--scenes: its values are missing; see weldsim regress --help"),
+        ("regress --methods --seeds 1", "--methods: its values are missing"),
     ],
 )
 def test_a_file_is_what_its_name_says(line, says, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert says in answer(shlex.split(line), capsys)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_does_not_take_the_place_of_a_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job").mkdir()
+    (tmp_path / "job" / "run.json").write_text("{}")
+    said = answer(["plan", "a.ply", "--report", "job"], capsys)
+    assert "--report job: holds a run, whose report would be lost; give another folder" in said
+    assert [path.name for path in (tmp_path / "job").iterdir()] == ["run.json"]
 
 
 FINDER = """

@@ -44,7 +44,7 @@ from weldsim.scene.world import build_world
         (
             "straight",
             ["pose.y=0 mm"],
-            r"pose\.x = \"(\S+ mm)\" and pose\.y = \"(\S+ mm)\" would do",
+            r"pose\.x = \"(\S+ mm)\", pose\.y = \"(\S+ mm)\"$",
             ["pose.x={}", "pose.y={}"],
         ),
     ],

@@ -89,7 +89,7 @@ def test_the_place_that_is_named_will_do(x: float, y: float, clamps: int) -> Non
     scene = plate(x, y, clamps, yaw=0.3)
     with pytest.raises(SceneError, match="pose of scene") as refused:
         build_world(scene)
-    found = re.search(r'pose\.x = "(\S+) mm" and pose\.y = "(\S+) mm" would do', str(refused.value))
+    found = re.search(r'pose\.x = "(\S+) mm", pose\.y = "(\S+) mm"$', str(refused.value))
     assert found is not None
     there = replace(scene.pose, x=float(found[1]) / 1e3, y=float(found[2]) / 1e3)
     build_world(replace(scene, pose=there))
