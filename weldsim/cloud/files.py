@@ -16,7 +16,7 @@ from numpy import ndarray
 
 from weldsim.cloud.arrays import read_array_cloud
 from weldsim.cloud.depth_files import read_depth_frame, write_depth_png
-from weldsim.cloud.extent import METRES, MIN_SPAN, check_box, check_extent, check_grain, check_reach, check_viewpoints, cropped_to
+from weldsim.cloud.extent import MIN_SPAN, check_box, check_extent, check_grain, check_reach, check_viewpoints, cropped_to
 from weldsim.cloud.pcd import read_pcd
 from weldsim.cloud.ply import read_ply
 from weldsim.cloud.ptx import is_ptx, read_ptx
