@@ -31,6 +31,7 @@ TWIN_GAIN = 3.0  # log likelihood
 SLANT_SCORE = 9.0  # standard deviations; until then it counts in the doubt, though not in full:
 MADE_UP_ODDS = 5.0  # how much likelier such a lean was made up than not, before: no groove leans after the way it is seen
 SYMMETRIC_ODDS = 8.0  # how much likelier a groove is symmetric than leaning, for the doubt: it weighs leans that go unseen
+LIKELIER = 0.5  # probability of a lean from which on it counts in the doubt as well told as it seems
 UNNOTICED = 0.02  # of the width: the lean of a groove that counts as symmetric
 BIN = 0.0035  # [m] across the seam, over which what no section can fit is alike
 MOST_DOUBT = 0.15  # of the width
@@ -95,8 +96,10 @@ def settled_section(blocks: Blocks, start: Section, noise: float) -> tuple[Secti
     last = _either(theta, views, start.step)
     between = float(mass @ (middle - last.theta[0]) ** 2)
     if not insists:  # leans may be less well told apart than they seem: the doubt errs on the wide side
+        leaning = float(mass[lean != 0.0].sum())
         mass = _likelihood(found, lean, views, blocks, start.step, whitened=False)
-        between = max(between, float(mass @ (middle - last.theta[0]) ** 2))
+        wide = float(mass @ (middle - last.theta[0]) ** 2)
+        between = max(between, wide) if leaning > LIKELIER else wide
     exchange = abs(float(np.polyfit(lean, middle, 1)[0]))
     unnoticed = float(mass[lean == 0.0].sum()) * (2 * UNNOTICED * exchange) ** 2
     most = MOST_DOUBT * float(last.theta[1])
