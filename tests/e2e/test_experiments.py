@@ -183,3 +183,17 @@ def test_the_twins_roughness_of_a_flat_part_is_that_of_public_frames():
     ratio = 1e3 * twin / part.real
     assert ((ratio[3:] > 1 / 1.8) & (ratio[3:] < 1.8)).all()
     assert (ratio[:3] < 1.0).all()
+
+
+@pytest.mark.render
+def test_the_points_of_a_seam_are_counted_within_their_own_sigma():
+    module = script("26_sigma")
+    found = module.shares(("y", 0))
+    assert len(found) == 1
+    points, one, two, sigma = found[0]
+    assert points > 100
+    assert one <= two <= 1.0
+    assert 5e-5 < sigma < 1e-3
+    assert module.holds({"within_one": 0.68, "within_two": 0.95})
+    assert not module.holds({"within_one": 0.85, "within_two": 0.99}), "sigma is too wide"
+    assert not module.holds({"within_one": 0.60, "within_two": 0.85}), "sigma is too narrow"
