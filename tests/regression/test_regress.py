@@ -317,9 +317,11 @@ def test_a_recorded_cloud_is_judged_against_a_seam_in_a_csv(tmp_path):
         read_known_seam(tmp_path / "dot.csv")
 
 
-@pytest.mark.parametrize("after", [0.0, 0.3, 1.0, 3.0])
-def test_a_key_that_interrupts_leaves_one_line_and_no_file(after, tmp_path):
-    """The workers get Ctrl-C too, as they begin, wait or work; `after` their start [s]."""
+def regress_and_press(after, tmp_path, *, background=False):
+    """Exit code and output of a `regress` with two workers, all of which get Ctrl-C `after` their start [s].
+
+    background: started as a shell starts what ends in `&`, with the key ignored.
+    """
     words = ["regress", "--scenes", "straight", "curve", "--methods", "profile", "--seeds", "2", "--jobs", "2", "--html", "a.html"]
     command = subprocess.Popen(
         [sys.executable, "-m", "weldsim", *words],
@@ -329,6 +331,7 @@ def test_a_key_that_interrupts_leaves_one_line_and_no_file(after, tmp_path):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN if background else signal.SIG_DFL),
     )
     children = Path(f"/proc/{command.pid}/task/{command.pid}/children")
     deadline = time.monotonic() + 60.0
@@ -336,6 +339,18 @@ def test_a_key_that_interrupts_leaves_one_line_and_no_file(after, tmp_path):
         time.sleep(0.02)
     time.sleep(after)
     os.killpg(command.pid, signal.SIGINT)
-    said = command.communicate(timeout=60)
-    assert (command.returncode, *said) == (130, "", "weldsim: interrupted\n")
+    said = command.communicate(timeout=120)
+    return command.returncode, *said
+
+
+@pytest.mark.parametrize("after", [0.0, 1.0, 3.0])
+def test_a_key_that_interrupts_leaves_one_line_and_no_file(after, tmp_path):
+    """The workers get it too, as they begin, wait or work."""
+    assert regress_and_press(after, tmp_path) == (130, "", "weldsim: interrupted\n")
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_in_the_background_the_key_is_ignored_by_command_and_workers(tmp_path):
+    code, _, _ = regress_and_press(1.0, tmp_path, background=True)
+    assert code in (0, 1), "it goes on to its verdict"
+    assert (tmp_path / "a.html").is_file()

@@ -332,7 +332,7 @@ def test_what_is_no_unit_viewpoint_or_box_of_a_cloud_is_told(tmp_path):
         f"lambda: read_cloud({file!r}, crop=((0, 0, 0),)), lambda: read_cloud({file!r}, crop=((0, 0, 0), (-1, 1, 1))),"
     )
     assert said == [
-        "unit 'km' is not one of m, cm, mm, in",
+        "unit 'km' is not one of m, cm, mm, um, in, ft",
         "viewpoint '0 0 1': three finite numbers in metres are needed",
         f"crop ((0, 0, 0),): {corners}",
         f"crop ((0, 0, 0), (-1, 1, 1)): {corners}",

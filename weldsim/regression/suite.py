@@ -212,14 +212,20 @@ def _held_back(number: int) -> Iterator[None]:
 
 
 def _end_quietly() -> None:
-    """A worker that starts, or waits for a task, just ends on Ctrl-C; Python would print a traceback."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """A worker that starts, or waits for a task, just ends on Ctrl-C; Python would print a traceback.
+
+    Started in the background by a shell (`&`), the command and its workers ignore the key, and go on.
+    """
+    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _in_worker(task: Task) -> tuple[Row, ...]:
     """`carry_out` in a process of its own; within it Ctrl-C raises, so that what is half-written is removed."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    before = signal.getsignal(signal.SIGINT)
+    if before != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         return carry_out(task)
     finally:
