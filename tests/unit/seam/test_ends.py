@@ -198,6 +198,25 @@ def test_a_groove_of_two_plates_begins_with_the_second_and_ends_with_the_first(m
     np.testing.assert_allclose(span, [0.038 - CELL / 2, 0.072 + CELL / 2], atol=1e-9)
 
 
+@pytest.mark.parametrize("turned", [34, 40, 50])
+@pytest.mark.parametrize("at_stop", [True, False])
+def test_a_groove_that_leaves_its_plate_at_a_corner_ends_there(measured: Fit, turned: int, at_stop: bool) -> None:
+    """The plate's two edges, at right angles, meet on the groove; a cell counts that reaches onto the plate."""
+    slope, step, s = np.tan(np.radians(turned)), measured.rail.step, np.arange(0.0, 0.12, CELL)
+    cells = []
+    for k in range(1, 6):
+        x = measured.inner + k * CELL
+        near = x - CELL / 2
+        for side, edge in ((1, near / slope), (-1, near * slope)):  # how far before the corner that column ends
+            inside = s - CELL / 2 < 0.085 - edge if at_stop else s + CELL / 2 > 0.035 + edge
+            cells += [(at, side * x) for at in s[inside]]
+    seen = slice(round(0.052 / step), round(0.068 / step) + 1)
+    fit = by_hand(measured, seen, (0.0, 0.12), (0.0, 0.12), beside=1.0)
+    fit = replace(fit, parent=replace(fit.parent, cells=np.array(cells)))
+    span = seam_span(fit, ProfileConfig())
+    assert span[at_stop] == pytest.approx(0.085 if at_stop else 0.035, abs=2.5e-3)
+
+
 @pytest.mark.parametrize("hidden", [True, False])
 def test_noise_hides_an_end_up_to_the_plates_edge_and_a_clear_end_is_where_the_depth_halves(measured: Fit, hidden: bool) -> None:
     """From 1 to 0.2 of the depth in one station, half of it is left after 5 / 8 of the way. With noise of 1 in the depth,

@@ -86,7 +86,7 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     across, edge = across[~goes_on], edge[~goes_on]
     if len(across) < 2 * FEWEST_COLUMNS:
         return None
-    two = _two_edges(across, edge)
+    two = _two_edges(across, edge, way)
     if two is not None:
         return way * min(way * two[0], way * two[1])  # the groove ends with the first
     slope, level = _median_line(across, edge)
@@ -95,8 +95,7 @@ def _edge_crossing(fit: Fit, way: int, here: float) -> float | None:
     if keep.sum() < 2 * FEWEST_COLUMNS:
         return None
     slope, level = np.polyfit(across[keep], edge[keep], 1).tolist()
-    # A cell aslant across the edge reaches past it: its column ends where its farther corner does.
-    return level - way * abs(slope) * CELL / 2
+    return _of_cells(slope, level, way)
 
 
 def _held(side: Bool[ndarray, "k"], goes_on: Bool[ndarray, "k"]) -> bool:
@@ -110,19 +109,35 @@ def _one_edge(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> float:
     return level if abs(slope) > ASLANT else float(np.median(edge))
 
 
-def _two_edges(across: Float[ndarray, "k"], edge: Float[ndarray, "k"]) -> tuple[float, float] | None:
-    """The edges left and right of a groove [m] where they are two plates'; None where one edge runs across it.
+def _two_edges(across: Float[ndarray, "k"], edge: Float[ndarray, "k"], way: int) -> tuple[float, float] | None:
+    """Where the edges left and right of a groove cross it [m], if they are two; None where one edge runs across it.
 
-    Two square edges that lie apart are much nearer to the columns' ends than any one line is; one edge aslant is not.
+    Of two plates they are square and lie apart; of one plate's corner both are aslant, and lean against each other. Such
+    edges are much nearer to the columns' ends than any one line is.
     """
     sides = [side for side in (across > 0, across < 0) if side.sum() >= FEWEST_COLUMNS]
     if len(sides) < 2:
         return None
-    one, other = (float(np.median(edge[side])) for side in sides)
     slope, level = _median_line(across, edge)
     off_line = float(np.median(np.abs(edge - level - slope * across)))
+    one, other = (float(np.median(edge[side])) for side in sides)
     off_squares = float(np.median(np.abs(edge - np.where(across > 0, one, other))))
-    return (one, other) if abs(one - other) > APART and off_squares < NEARER * off_line else None
+    if abs(one - other) > APART and off_squares < NEARER * off_line:
+        return one, other
+    lines = [_median_line(across[side], edge[side]) for side in sides]
+    off_corner = np.concatenate(
+        [np.abs(edge[side] - line[1] - line[0] * across[side]) for side, line in zip(sides, lines, strict=True)]
+    )
+    against = lines[0][0] * lines[1][0] < 0 and min(abs(line[0]) for line in lines) > ASLANT
+    if not against or float(np.median(off_corner)) >= NEARER * off_line:
+        return None
+    first, second = (_of_cells(slope, level, way) for slope, level in lines)
+    return first, second
+
+
+def _of_cells(slope: float, level: float, way: int) -> float:
+    """Where an edge aslant crosses the groove [m]: a cell across it reaches past it by as much as its farther corner does."""
+    return level - way * abs(slope) * CELL / 2
 
 
 def _median_line(x: Float[ndarray, "k"], y: Float[ndarray, "k"]) -> tuple[float, float]:
