@@ -268,8 +268,8 @@ def _scores(
     root = np.sqrt(views.weight)
     residual = np.where(views.each > 0, depth[views.of] - blocks.depth, 0.0) * views.each / np.maximum(root, 1e-12)[views.of]
     reach = (pull * root) @ views.white.T
-    told, voted = (reach, residual @ views.white.T) if whitened else (reach @ views.white, residual)
-    score = told[:, views.of] * voted
+    pulls, residuals = (reach, residual @ views.white.T) if whitened else (reach @ views.white, residual)
+    score = pulls[:, views.of] * residuals
     number = np.floor(blocks.x / BIN).astype(int)
     return np.stack([score[:, :, number == k].sum(axis=2) for k in np.unique(number)], axis=2)
 
